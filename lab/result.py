@@ -1,0 +1,62 @@
+"""What a test comes to: the modes and matrices found, the truth where there is one, and the comparison of both."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from identification.modes import Modes
+from identification.stability import Stabilization
+from identification.systems import Realization, SecondOrder
+from lab.compare import Comparison
+
+
+@dataclass(frozen=True)
+class Criterion:
+    """One requirement of a scenario and how it came out.
+
+    Attributes:
+        name: what is required, as in the scenario file.
+        limit: the required bound.
+        value: what was reached; None when it could not be had.
+        passed: whether it is fulfilled.
+    """
+
+    name: str
+    limit: float
+    value: float | None
+    passed: bool
+
+
+@dataclass(frozen=True, eq=False)
+class Result:
+    """Everything that `result.json` and the report tell of one identification.
+
+    Attributes:
+        title: what was tested.
+        sample_rate: of the recording [Hz].
+        modes: identified modes, sorted by frequency.
+        stable: whether each mode stayed put over the model orders.
+        second_order: identified M, C, K, or None.
+        realization: state-space models that the modes come from.
+        stabilization: poles of every order and what became of them; None when one order was asked for.
+        truth_modes: modes of the model that made the data, at the same outputs, or None.
+        truth_second_order: its M, C, K, or None.
+        comparison: estimate against truth, or None.
+        criteria: requirements of the scenario.
+        warnings: what a careful reader should know, one sentence each.
+        notes: what the method chose by itself and why, one sentence each.
+    """
+
+    title: str
+    sample_rate: float
+    modes: Modes
+    stable: tuple[bool, ...]
+    second_order: SecondOrder | None
+    realization: Realization
+    stabilization: Stabilization | None
+    truth_modes: Modes | None = None
+    truth_second_order: SecondOrder | None = None
+    comparison: Comparison | None = None
+    criteria: tuple[Criterion, ...] = ()
+    warnings: tuple[str, ...] = ()
+    notes: tuple[str, ...] = ()
