@@ -1,20 +1,20 @@
-"""What can go wrong in the lab, said in one line that tells the next step."""
+"""What can be wrong with what the user hands to the lab, said in one line that tells the next step."""
 
 
 class LabError(Exception):
-    """A mistake in what the lab was given; shown as one line, exit status 2."""
-
-
-class RigError(LabError):
-    """A structure or measurement chain that cannot be built or simulated."""
-
-
-class StudyError(LabError):
-    """A scenario or study file with a wrong key or value."""
+    """Anything the user can put right: a file, a name, a scenario."""
 
 
 class FileError(LabError):
-    """A file that is missing, damaged or of another format."""
+    """A file or folder that cannot be read, is not what it claims to be, or cannot be written."""
+
+
+class RigError(LabError):
+    """A model that MuJoCo does not compile, or that does not fit the request."""
+
+
+class StudyError(LabError):
+    """A scenario or study file with an unknown key or an impossible value."""
 
 
 class UnknownNameError(LabError):
@@ -22,4 +22,4 @@ class UnknownNameError(LabError):
 
 
 class DivergedError(LabError):
-    """A simulation whose state is no longer finite."""
+    """A simulation that left the finite numbers."""
