@@ -1,0 +1,92 @@
+"""Block Hankel matrices, and the state-space models that a subspace of observability gives at every order.
+
+Matrices Y_0, Y_1, … that obey Y_k = C Aᵏ X have a Hankel matrix H = O [X, AX, …] with O = [C; CA; CA²; …].
+Its leading left singular vectors U span the columns of O, and U without its last block row differs from U
+without its first one by A alone.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+
+import numpy as np
+import scipy.linalg
+
+from identification.errors import OrderError, TooShortError
+from identification.recording import Array
+
+
+def block_hankel(values: Array, n_rows: int, n_columns: int, *, first: int = 0) -> Array:
+    """Block Hankel matrix with block (i, j) = values[first + i + j].
+
+    Args:
+        values: a matrix per lag, shape (n_lags, n_outputs, n_inputs).
+        n_rows: block rows.
+        n_columns: block columns.
+        first: lag of the top left block.
+
+    Returns:
+        Shape (n_rows * n_outputs, n_columns * n_inputs).
+
+    Raises:
+        TooShortError: the last block would need a lag that is not there.
+
+    Source: Juang (1992), thesis, eq. (2.20); Juang and Pappa (1985), J. Guidance 8(5).
+    """
+    n_lags, n_outputs, n_inputs = values.shape
+    if first + n_rows + n_columns - 1 > n_lags:
+        raise TooShortError(
+            f"a Hankel matrix of {n_rows} x {n_columns} blocks from lag {first} on needs "
+            f"{first + n_rows + n_columns - 1} lags and {n_lags} were given; take fewer rows or columns"
+        )
+    windows = np.lib.stride_tricks.sliding_window_view(values[first:], n_columns, axis=0)[:n_rows]
+    # (n_rows, n_outputs, n_inputs, n_columns), the last axis counting the columns
+    return np.ascontiguousarray(windows.transpose(0, 1, 3, 2)).reshape(
+        n_rows * n_outputs, n_columns * n_inputs
+    )
+
+
+def shift_invariance(
+    U: Array, singular_values: Array, *, n_outputs: int, orders: Iterable[int]
+) -> list[tuple[Array, Array]]:
+    """State matrix A and output matrix C of each order, from one factorization of the leading left subspace.
+
+    The observability matrix of order n is O_n = U_n S_n^½. With one QR factorization of U without its last
+    block row, the least-squares solution at order n needs only leading n x n blocks: A_n = R_n⁻¹ (Qᵀ U₂)_n,
+    because the leading n columns of Q and of R are the factors of the leading n columns of U.
+
+    Args:
+        U: orthonormal columns, most important first, shape (n_rows * n_outputs, n_max).
+        singular_values: of the columns of `U`, shape (n_max,) or longer; they scale the states only.
+        n_outputs: rows of a block.
+        orders: orders asked for, each at most n_max.
+
+    Returns:
+        A, shape (n, n), and C, shape (n_outputs, n), for each n in `orders`.
+
+    Raises:
+        OrderError: an order exceeds the columns of `U`, or the rows left when one block row is dropped.
+
+    Source: Kung (1978), 12th Asilomar Conf., the shift invariance of the observability matrix; nested over
+    the orders as in Döhler and Mevel (2012), Mech. Syst. Signal Process. 31.
+    """
+    orders = list(orders)
+    n_max = max(orders, default=0)
+    n_columns = min(U.shape[1], U.shape[0] - n_outputs)
+    if n_max > n_columns:
+        raise OrderError(
+            f"order {n_max} exceeds the {n_columns} independent columns of the {U.shape[0]} x {U.shape[1]} "
+            "subspace without its last block row; lower the order or take more block rows"
+        )
+    Q, R = scipy.linalg.qr(U[:-n_outputs, :n_max], mode="economic")
+    X = Q.T @ U[n_outputs:, :n_max]  # (n_max, n_max)
+    if n_max and np.min(np.abs(np.diag(R))) == 0:
+        raise OrderError(f"order {n_max} has a state that only the last block row sees; take more block rows")
+    # The floor keeps the scaling invertible where a singular value is zero; any scaling gives the same model.
+    floor = np.finfo(float).eps * np.max(singular_values[:1], initial=0.0) or 1.0
+    root = np.sqrt(np.maximum(singular_values[:n_max], floor))
+    systems = []
+    for n in orders:
+        A = scipy.linalg.solve_triangular(R[:n, :n], X[:n, :n])
+        systems.append((A * root[:n] / root[:n, None], U[:n_outputs, :n] * root[:n]))
+    return systems
