@@ -1,0 +1,1 @@
+"""Recordings, results and output folders on disk."""
