@@ -26,7 +26,7 @@ OUTPUTS = {
 
 @contextmanager
 def output_folder(path: str | Path, *, force: bool = False) -> Iterator[Path]:
-    """A hidden folder to write into, which takes the name `path` when the block ends well and vanishes otherwise.
+    """A hidden folder to write into: it takes the name `path` when the block ends well, or vanishes.
 
     Args:
         path: folder to come; missing parents are made.

@@ -2,9 +2,9 @@
 
 Attributes of the file are format = "modal-recording" and version = 1, optionally title, source and further
 facts. Each test run is a group /records/0, /records/1, … with the attributes kind and sample_rate [Hz],
-optionally start_time, note and further facts. In it lie the data sets inputs and outputs, shape (n_channels,
-n_samples), chunked along time, with the attributes names and units, optionally dofs and factors, one entry per
-channel.
+optionally start_time, note and further facts. In it lie the data sets inputs and outputs, shape
+(n_channels, n_samples), chunked along time, with the attributes names and units, optionally dofs and factors,
+one entry per channel.
 """
 
 from lab.files.recording_reader import load

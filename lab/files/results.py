@@ -23,7 +23,7 @@ VERSION = 1
 
 
 def result_document(result: Result) -> dict[str, Any]:
-    """What `result.json` says, as plain lists, numbers, texts and None; None stands for every number not finite."""
+    """What `result.json` says, as plain lists, numbers and texts; None for a number that is not finite."""
     truth = None
     if result.truth_modes is not None:
         truth = {
@@ -49,7 +49,7 @@ def result_document(result: Result) -> dict[str, Any]:
         "warnings": list(result.warnings),
         "notes": list(result.notes),
     }
-    return _plain(document)
+    return dict(_plain(document))
 
 
 def save_result(result: Result, path: str | Path) -> None:
@@ -89,7 +89,7 @@ def load_result(path: str | Path) -> dict[str, Any]:
     form = document.get("format") if isinstance(document, dict) else None
     if form != FORMAT or document.get("version") != VERSION:
         raise FileError(f"{path}: format is {form!r}; expected {FORMAT!r} version {VERSION}")
-    return document
+    return dict(document)
 
 
 def _modes(modes: Modes) -> list[dict[str, Any]]:
