@@ -1,0 +1,160 @@
+"""Covariances between outputs at different times: all that a stationary random response tells about the structure.
+
+Under white excitation the covariances R_k = E[y_{j+k} y_jᵀ] obey R_k = C A^{k-1} G for k >= 1, like the pulse
+responses of a system with the structure's own poles and shapes. Lag zero does not: it carries the variance of the
+measurement noise, and is therefore left out unless asked for.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+import scipy.fft
+from numpy.typing import NDArray
+
+from identification.errors import IdentificationError, RecordingError, TooShortError
+from identification.recording import Array, Record, Recording
+
+SEGMENTS = 16
+"""Segments transformed at a time: enough to spread the cost of adding up spectra, few enough to stay in the cache."""
+
+
+def output_covariances(
+    recording: Recording, n_lags: int, *, references: Sequence[str] | None = None, first_lag: int = 1
+) -> Array:
+    """Covariances R_k = E[y_{j+k} y_ref_jᵀ] of the outputs with the reference outputs, lag by lag.
+
+    Each record loses its own mean, and no product reaches from one record into another. The sum over a record of N
+    samples has N - k terms; the total over all records is divided by the total number of terms, because a division by
+    N would multiply R_k by (1 - k/N) and so add damping that is not there.
+
+    Args:
+        recording: outputs are read block by block, so that a recording on disk may exceed the memory.
+        n_lags: how many lags.
+        references: names of the reference outputs; all outputs when None.
+        first_lag: the smallest lag k; 1 leaves out the lag that carries the measurement noise.
+
+    Returns:
+        R_k for k = first_lag, …, first_lag + n_lags - 1, shape (n_lags, n_outputs, n_references)
+        [unit of output times unit of reference].
+
+    Raises:
+        TooShortError: the longest record is not longer than the largest lag.
+        RecordingError: a reference does not exist, or a sample is missing.
+
+    Source: Peeters and De Roeck (1999), Mech. Syst. Signal Process. 13(6), eq. (22); Cambraia and Kurka (2010), eq. (26).
+    """
+    if n_lags < 1 or first_lag < 0:
+        raise IdentificationError(
+            f"{n_lags} lags from lag {first_lag} on were asked for; expected at least one lag, from lag 0 or later on"
+        )
+    n = first_lag + n_lags - 1
+    longest = max(record.n_samples for record in recording.records)
+    if longest <= n:
+        raise TooShortError(
+            f"lag {n} needs a record of more than {n} samples and the longest has {longest}; ask for fewer lags"
+        )
+    rows = reference_rows(recording, references)
+    total = np.zeros((n + 1, len(recording.outputs), rows.size))
+    n_terms = np.zeros(n + 1)
+    with np.errstate(invalid="ignore", over="ignore"):  # told by name just below
+        for record in filter(lambda record: record.n_samples, recording.records):
+            last = min(n, record.n_samples - 1)  # a short record has no larger lags
+            total[: last + 1] += _products(record, rows, last)
+            n_terms[: last + 1] += record.n_samples - np.arange(last + 1)
+    if not np.isfinite(np.sum(total)):
+        recording.require_complete()
+        raise RecordingError("the squares of the outputs overflow; give the outputs in a smaller scale")
+    total /= n_terms[:, None, None]
+    return total[first_lag:]
+
+
+def reference_rows(recording: Recording, references: Sequence[str] | None) -> NDArray[np.intp]:
+    """Rows of the reference outputs.
+
+    Raises:
+        RecordingError: a name is not among the outputs, appears twice, or none was given.
+    """
+    names = [channel.name for channel in recording.outputs]
+    if references is None:
+        return np.arange(len(names))
+    chosen = list(references)
+    if not chosen or len(set(chosen)) < len(chosen) or not set(chosen) <= set(names):
+        raise RecordingError(
+            f"references are {', '.join(map(repr, chosen)) or 'empty'}; "
+            f"expected one or more different outputs out of {', '.join(names)}"
+        )
+    return np.array([names.index(name) for name in chosen])
+
+
+def _products(record: Record, rows: NDArray[np.intp], n: int) -> Array:
+    """Σ_j (y_{j+k} - ȳ)(y_ref_j - ȳ_ref)ᵀ over one record for k = 0 … n, shape (n + 1, n_outputs, n_references).
+
+    The record is cut into segments: the references of `step` samples with the outputs of the same and n more samples.
+    Both are padded to the length of one fast Fourier transform, and their cross-spectra add up over the segments.
+    """
+    n_outputs = record.outputs.shape[0]
+    length = _transform_length(n, record.n_samples, n_outputs * rows.size)
+    step = length - n
+    size = 1 << (SEGMENTS * step - 1).bit_length()
+    spectrum = np.zeros((length // 2 + 1, n_outputs, rows.size), complex)
+    # Taking off a nearby constant first keeps a large offset from eating the digits of a small vibration.
+    offset = np.zeros((n_outputs, 1))
+    pending = np.empty((n_outputs, 0))
+    head = np.empty((n_outputs, 0))
+    total = np.zeros(n_outputs)
+    for _, block in record.blocks(size):
+        if not pending.shape[1]:
+            offset = np.mean(block, axis=1, keepdims=True)
+        block = block - offset
+        total += np.sum(block, axis=1)
+        if head.shape[1] < n:
+            head = np.hstack([head, block[:, : n - head.shape[1]]])
+        pending = np.hstack([pending, block])
+        n_segments = (pending.shape[1] - n) // step
+        if n_segments > 0:
+            spectrum += _cross_spectrum(pending, rows, n_segments, step, length)
+            pending = pending[:, n_segments * step :]
+    tail = pending[:, max(pending.shape[1] - n, 0) :].copy()
+    n_segments = -(-pending.shape[1] // step)
+    pending = np.pad(pending, ((0, 0), (0, n_segments * step + n - pending.shape[1])))
+    spectrum += _cross_spectrum(pending, rows, n_segments, step, length)
+    products = scipy.fft.irfft(spectrum, length, axis=0, overwrite_x=True)[: n + 1]
+    return products - _mean_part(total, head, tail, rows, record.n_samples)
+
+
+def _transform_length(n: int, n_samples: int, n_pairs: int) -> int:
+    """A power of two of several times the largest lag, as long as the cross-spectra fit in about 64 MiB."""
+    largest = max(1 << 22, n_pairs) // n_pairs
+    length = 1 << max(n, 127).bit_length()
+    while length < min(8 * n, n_samples) and length < largest:
+        length *= 2
+    return length if length > n + 1 else 2 * length
+
+
+def _cross_spectrum(
+    signals: Array, rows: NDArray[np.intp], n_segments: int, step: int, length: int
+) -> NDArray[np.complex128]:
+    """Σ over segments of Y(f) R(f)ᴴ, shape (n_frequencies, n_outputs, n_references)."""
+    windows = np.lib.stride_tricks.sliding_window_view(signals, length, axis=1)[:, ::step][:, :n_segments]
+    Y = scipy.fft.rfft(windows)  # (n_outputs, n_segments, n_frequencies)
+    R = scipy.fft.rfft(windows[rows, :, :step], length)
+    return np.asarray(
+        np.ascontiguousarray(Y.transpose(2, 0, 1)) @ np.conjugate(R.transpose(2, 1, 0), order="C")
+    )
+
+
+def _mean_part(total: Array, head: Array, tail: Array, rows: NDArray[np.intp], n_samples: int) -> Array:
+    """What the mean adds to the sums of products, shape (n_lags, n_outputs, n_references)."""
+    mean = total / n_samples
+    n = head.shape[1]
+    before = np.hstack([np.zeros((total.size, 1)), np.cumsum(head, axis=1)])  # sum of the first k samples
+    after = np.hstack(
+        [np.zeros((total.size, 1)), np.cumsum(tail[:, ::-1], axis=1)]
+    )  # sum of the last k samples
+    late = (total[:, None] - before).T  # (n_lags, n_outputs): the samples that follow another one by k
+    early = (total[:, None] - after).T[:, rows]
+    n_terms = n_samples - np.arange(n + 1)
+    part = late[:, :, None] * mean[rows] + mean[:, None] * early[:, None, :]
+    return np.asarray(part - n_terms[:, None, None] * np.outer(mean, mean[rows]))
