@@ -33,8 +33,9 @@ def find(kind: str, name: str) -> Path:
     known = files(kind)
     path = known.get(Path(name).stem) if Path(name).name == name else None
     if path is None or Path(name).suffix not in ("", path.suffix):
+        listed = ", ".join(known) or "none"
         raise UnknownNameError(
-            f"{kind[:-1]} {name!r} is neither a file nor in the catalogue; there are {', '.join(known) or 'none'}"
+            f"{kind[:-1]} {name!r} is neither a file nor in the catalogue; there are {listed}"
         )
     return path
 

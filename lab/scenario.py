@@ -1,0 +1,232 @@
+"""A scenario: everything that defines one virtual test, read strictly from a TOML file."""
+
+from __future__ import annotations
+
+import dataclasses
+import json
+import tomllib
+from pathlib import Path
+from typing import Annotated, Any
+
+from pydantic import (
+    BaseModel,
+    ConfigDict,
+    Field,
+    PositiveFloat,
+    PositiveInt,
+    PrivateAttr,
+    TypeAdapter,
+    ValidationError,
+)
+
+from lab import catalogue
+from lab.errors import FileError, StudyError
+from lab.excitation import EXCITATIONS, Excitation
+
+Fraction = Annotated[float, Field(ge=0, le=1)]
+Bound = Annotated[float, Field(ge=0)]
+
+
+class Table(BaseModel):
+    """A table of the file: unknown keys, numbers written as text and infinities are refused."""
+
+    model_config = ConfigDict(extra="forbid", frozen=True, strict=True, allow_inf_nan=False)
+
+
+class Schedule(Table):
+    """How the test is run.
+
+    Attributes:
+        sample_rate: [Hz].
+        duration: of each record [s].
+        records: number of records; for pulses, of each input.
+        accuracy: largest relative error of the simulation; chosen from the instruments when left out.
+    """
+
+    sample_rate: PositiveFloat
+    duration: PositiveFloat
+    records: PositiveInt = 1
+    accuracy: PositiveFloat | None = None
+
+
+class Channels(Table):
+    """Which actuators and sensors are connected, by name; when left out, all that the structure can move."""
+
+    inputs: list[str] | None = None
+    outputs: list[str] | None = None
+
+
+class Instruments(Table):
+    """What measures; ideal where left out.
+
+    Attributes:
+        noise_percent: white noise on every channel, in percent of its RMS.
+        accelerometer, force_sensor, shaker, acquisition: names of presets.
+    """
+
+    noise_percent: Bound | None = None
+    accelerometer: str | None = None
+    force_sensor: str | None = None
+    shaker: str | None = None
+    acquisition: str | None = None
+
+
+class Identification(Table):
+    """How the recording is identified; chosen from the data where left out.
+
+    Attributes:
+        method: name, as in `lab list methods`.
+        order: number of states.
+        settings: further settings of the method, by name.
+    """
+
+    method: str | None = None
+    order: PositiveInt | None = None
+    settings: dict[str, Any] = {}
+
+
+class Criteria(Table):
+    """What the test must reach.
+
+    Attributes:
+        modes: at least so many modes of the structure found.
+        frequency_error, damping_ratio_error: largest relative error over the paired modes.
+        mac: smallest modal assurance criterion over the paired modes.
+        mass_error, damping_error, stiffness_error: largest entry error over largest entry of the matrix.
+    """
+
+    modes: PositiveInt | None = None
+    frequency_error: Bound | None = None
+    damping_ratio_error: Bound | None = None
+    mac: Fraction | None = None
+    mass_error: Bound | None = None
+    damping_error: Bound | None = None
+    stiffness_error: Bound | None = None
+
+
+class Scenario(Table):
+    """A whole virtual test.
+
+    Attributes:
+        title: what is tested, in one line.
+        model: MJCF file, seen from the scenario file, or a name in the catalogue.
+        seed: of everything random.
+        test: how the test is run.
+        excitation: its kind, as in `EXCITATIONS`, and its settings.
+        channels: which actuators and sensors are connected.
+        instruments: what measures.
+        identification: how the recording is identified.
+        criteria: what the test must reach.
+    """
+
+    title: str
+    model: str
+    seed: Annotated[int, Field(ge=0)] = 0
+    test: Schedule
+    excitation: dict[str, Any]
+    channels: Channels = Channels()
+    instruments: Instruments = Instruments()
+    identification: Identification = Identification()
+    criteria: Criteria = Criteria()
+    _folder: Path = PrivateAttr(default=Path())
+    _text: str = PrivateAttr(default="")
+
+    @property
+    def text(self) -> str:
+        """The file as written, empty for a scenario made in Python."""
+        return self._text
+
+    def model_file(self) -> Path:
+        """Where the model lies.
+
+        Raises:
+            UnknownNameError: neither a file nor a name in the catalogue.
+        """
+        beside = self._folder / self.model
+        return beside if beside.is_file() else catalogue.find("models", self.model)
+
+    def drive(self) -> Excitation:
+        """The excitation.
+
+        Raises:
+            StudyError: unknown kind or setting, or an impossible value.
+        """
+        settings = dict(self.excitation)
+        kind = settings.pop("kind", None)
+        if kind is None:
+            raise StudyError("key 'kind' is missing in [excitation]")
+        if kind not in EXCITATIONS:
+            raise StudyError(f"kind = {kind!r} in [excitation]; expected one of {', '.join(EXCITATIONS)}")
+        known = [field.name for field in dataclasses.fields(EXCITATIONS[kind])]
+        unknown = [key for key in settings if key not in known]
+        if unknown:
+            raise StudyError(_unknown_key(unknown[0], "excitation", ["kind", *known]))
+        # As JSON, a list may stand for a tuple while text still does not stand for a number.
+        text = json.dumps(settings, default=str)
+        try:
+            return TypeAdapter(EXCITATIONS[kind]).validate_json(text, strict=True)
+        except ValidationError as error:
+            raise StudyError(_explain(error, "excitation")) from None
+
+
+def load_scenario(path: str | Path) -> Scenario:
+    """The scenario in a TOML file, or of that name in the catalogue.
+
+    Raises:
+        FileError: the file cannot be read.
+        UnknownNameError: neither a file nor a name in the catalogue.
+        StudyError: not TOML, an unknown or missing key, an impossible value.
+    """
+    path = Path(path)
+    if not path.exists() and path.name == str(path):
+        path = catalogue.find("scenarios", str(path))
+    try:
+        text = path.read_text(encoding="utf-8")
+    except OSError as error:
+        raise FileError(
+            f"{path}: cannot be read ({error.strerror}); expected a scenario file (TOML)"
+        ) from None
+    except UnicodeDecodeError:
+        raise FileError(f"{path}: is not text; expected a scenario file (TOML)") from None
+    try:
+        scenario = Scenario.model_validate(tomllib.loads(text))
+        scenario._folder, scenario._text = path.parent, text
+        scenario.drive()
+    except tomllib.TOMLDecodeError as error:
+        raise StudyError(f"{path}: is not TOML ({error})") from None
+    except ValidationError as error:
+        raise StudyError(f"{path}: {_explain(error)}") from None
+    except StudyError as error:
+        raise StudyError(f"{path}: {error}") from None
+    return scenario
+
+
+def _explain(error: ValidationError, *inside: str) -> str:
+    """The first complaint in one line: which key, where, what is allowed."""
+    # A misspelt key is also a missing one: the misspelling is the better news.
+    first = min(error.errors(include_url=False), key=lambda each: each["type"] != "extra_forbidden")
+    *tables, key = (*inside, *(part for part in first["loc"] if isinstance(part, str)))
+    key += "".join(f"[{part}]" for part in first["loc"] if isinstance(part, int))
+    if first["type"] == "extra_forbidden":
+        return _unknown_key(key, ".".join(tables), _keys(tables))
+    where = _place(".".join(tables))
+    if first["type"] == "missing":
+        return f"key {key!r} is missing {where}"
+    return f"{key} = {first['input']!r} {where}: {first['msg'][:1].lower()}{first['msg'][1:]}"
+
+
+def _unknown_key(key: str, table: str, allowed: list[str]) -> str:
+    return f"unknown key {key!r} {_place(table)}; allowed are {', '.join(allowed)}"
+
+
+def _place(table: str) -> str:
+    return f"in [{table}]" if table else "at the top"
+
+
+def _keys(tables: list[str]) -> list[str]:
+    model: type[BaseModel] = Scenario
+    for table in tables:
+        annotation = model.model_fields[table].annotation
+        assert isinstance(annotation, type)
+        model = annotation
+    return list(model.model_fields)

@@ -1,0 +1,92 @@
+"""One screen that tells what a test came to."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from identification.recording import Array
+from identification.systems import SecondOrder
+from lab.result import Result
+
+MAX_DOFS = 8
+"""Matrices up to this size are printed entry by entry."""
+
+MAX_MODES = 20
+
+
+def summary(result: Result) -> str:
+    """Matrices with their errors, modes beside the true ones, criteria and warnings, as lines of text."""
+    parts = [_headline(result), _matrices(result), _modes(result), _criteria(result)]
+    parts += [f"warning: {warning}" for warning in result.warnings]
+    return "\n\n".join(part for part in parts if part)
+
+
+def _headline(result: Result) -> str:
+    found = result.realization
+    return f"{result.title}\n{found.method}, order {found.order}, sampled at {result.sample_rate:g} Hz"
+
+
+def _matrices(result: Result) -> str:
+    estimate = result.second_order
+    if estimate is None:
+        return ""
+    named = (
+        ("M [kg]", estimate.mass, "mass_error"),
+        ("C [N s/m]", estimate.damping, "damping_error"),
+        ("K [N/m]", estimate.stiffness, "stiffness_error"),
+    )
+    blocks = []
+    for name, matrix, error in named:
+        value = getattr(result.comparison, error) if result.comparison else None
+        off = "" if value is None else f"   largest error / largest entry {value:.1e}"
+        rows = _rows(matrix, estimate) if len(estimate.dofs) <= MAX_DOFS else []
+        blocks.append("\n".join([name + off, *rows]))
+    return "\n".join(blocks)
+
+
+def _rows(matrix: Array, estimate: SecondOrder) -> list[str]:
+    # Entries below the printed digits of the largest one are rounding, not information.
+    shown = np.where(np.abs(matrix) < 1e-10 * np.max(np.abs(matrix)), 0.0, matrix)
+    width = max(len(dof) for dof in estimate.dofs)
+    return [
+        f"  {dof:<{width}}" + "".join(f" {value:>17.11g}" for value in row)
+        for dof, row in zip(estimate.dofs, shown, strict=True)
+    ]
+
+
+def _modes(result: Result) -> str:
+    modes = result.modes
+    if not len(modes):
+        return "no mode found"
+    pairs = {pair.estimate: pair for pair in result.comparison.pairs} if result.comparison else {}
+    head = f"{'mode':>4} {'Hz':>10} {'damping %':>10} {'stable':>7}"
+    if result.comparison:
+        head += f" {'true Hz':>10} {'Hz error':>9} {'true %':>8} {'damp. error':>11} {'MAC':>8}"
+    lines = [head]
+    for k in range(min(len(modes), MAX_MODES)):
+        stable = "yes" if result.stable[k] else "no"
+        line = f"{k + 1:>4} {modes.frequency_hz[k]:>10.5g} {100 * modes.damping_ratio[k]:>10.4g} {stable:>7}"
+        if k in pairs and result.truth_modes is not None:
+            pair, truth = pairs[k], result.truth_modes
+            line += (
+                f" {truth.frequency_hz[pair.truth]:>10.5g} {pair.frequency_error:>9.1e}"
+                f" {100 * truth.damping_ratio[pair.truth]:>8.4g} {pair.damping_error:>11.1e} {pair.mac:>8.5f}"
+            )
+        lines.append(line)
+    if len(modes) > MAX_MODES:
+        lines.append(f"     and {len(modes) - MAX_MODES} more")
+    if result.comparison and result.truth_modes is not None:
+        n_missed = len(result.comparison.missed)
+        lines.append(
+            f"     {len(result.truth_modes) - n_missed} of {len(result.truth_modes)} true modes found"
+        )
+    return "\n".join(lines)
+
+
+def _criteria(result: Result) -> str:
+    lines = []
+    for criterion in result.criteria:
+        value = "not available" if criterion.value is None else f"{criterion.value:.3g}"
+        verdict = "met   " if criterion.passed else "MISSED"
+        lines.append(f"  {verdict} {criterion.name}: {value} (limit {criterion.limit:g})")
+    return "\n".join(["criteria", *lines]) if lines else ""
