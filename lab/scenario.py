@@ -145,6 +145,18 @@ class Scenario(Table):
         beside = self._folder / self.model
         return beside if beside.is_file() else catalogue.find("models", self.model)
 
+    def changed(
+        self, *, seed: int | None = None, method: str | None = None, order: int | None = None
+    ) -> Scenario:
+        """The scenario with another seed, method or order where one is given; a new method starts afresh."""
+        update: dict[str, Any] = {} if seed is None else {"seed": seed}
+        chosen = self.identification
+        if method is not None and method != chosen.method:
+            chosen = Identification(method=method)
+        if order is not None:
+            chosen = chosen.model_copy(update={"order": order})
+        return self.model_copy(update={**update, "identification": chosen})
+
     def drive(self) -> Excitation:
         """The excitation.
 

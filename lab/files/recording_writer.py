@@ -51,6 +51,8 @@ def save(recording: Recording, path: str | Path, *, dtype: DTypeLike = np.float6
     ) as writer:
         for record in recording.records:
             writer.start(record.kind, record.attributes, start_time=record.start_time, note=record.note)
+            # Tells how many rows there are, even when there is no sample.
+            writer.append(np.zeros((record.inputs.shape[0], 0)), np.zeros((record.outputs.shape[0], 0)))
             for inputs, outputs in record.blocks(BLOCK):
                 writer.append(inputs, outputs)
 

@@ -33,8 +33,8 @@ PREFIXES = {"": 1.0, "G": 1e9, "M": 1e6, "k": 1e3, "c": 1e-2, "m": 1e-3, "u": 1e
 PREFIXED = ("m", "rad", "g", "N", "N m", "V", "A", "Pa", "bar", "strain")
 """Units that take a prefix."""
 
-RATES = {"": "", "s": "/s", "s^2": "/s^2", "s/s": "/s^2"}
-"""What may stand below a length or an angle, and its SI form."""
+RATES = {"": "", "/s": "/s", "/s^2": "/s^2", "/s/s": "/s^2"}
+"""What may follow a length or an angle, and its SI form."""
 
 _SPELLINGS = {
     "µ": "u",
@@ -73,9 +73,9 @@ def to_si(unit: str) -> tuple[str, float]:
     text = unit.strip()
     for spelling, plain in _SPELLINGS.items():
         text = text.replace(spelling, plain)
-    above, _, below = re.sub(r"\s*/\s*", "/", text).partition("/")
+    above, slash, below = re.sub(r"\s*/\s*", "/", text).partition("/")
     si, factor = _TABLE.get(above, ("", 0.0))
-    rate = RATES.get(below)
+    rate = RATES.get(slash + below)
     if not si or rate is None or (rate and si not in ("m", "rad")):
         raise FileError(
             f"unit {unit!r} is unknown; expected one of {', '.join(UNITS)}, with prefix "
