@@ -190,16 +190,17 @@ class _Progress:
     def __init__(self, label: str, quiet: bool) -> None:
         self.bar: Any = None
         if sys.stderr.isatty() and not quiet:
-            self.bar = click.progressbar(length=1000, label=label, file=sys.stderr)
+            self.bar = click.progressbar(length=1, label=label, file=sys.stderr)
 
-    def __enter__(self) -> Callable[[float], None]:
+    def __enter__(self) -> Callable[..., None]:
         if self.bar is not None:
             self.bar.__enter__()
         return self.show
 
-    def show(self, share: float) -> None:
+    def show(self, n: int, *, total: int) -> None:
         if self.bar is not None:
-            self.bar.update(round(1000 * share) - self.bar.pos)
+            self.bar.length = total
+            self.bar.update(n)
 
     def __exit__(self, *error: Any) -> None:
         if self.bar is not None:

@@ -25,6 +25,7 @@ from lab.excitation import EXCITATIONS, Excitation
 
 Fraction = Annotated[float, Field(ge=0, le=1)]
 Bound = Annotated[float, Field(ge=0)]
+Choice = str | dict[str, Any]
 
 
 class Table(BaseModel):
@@ -39,13 +40,13 @@ class Schedule(Table):
     Attributes:
         sample_rate: [Hz].
         duration: of each record [s].
-        records: number of records; for pulses, of each input.
+        runs: how often the test is repeated; with pulses, impacts and sweeps, a run is one record per input.
         accuracy: largest relative error of the simulation; chosen from the instruments when left out.
     """
 
     sample_rate: PositiveFloat
     duration: PositiveFloat
-    records: PositiveInt = 1
+    runs: PositiveInt = 1
     accuracy: PositiveFloat | None = None
 
 
@@ -60,15 +61,18 @@ class Instruments(Table):
     """What measures; ideal where left out.
 
     Attributes:
-        noise_percent: white noise on every channel, in percent of its RMS.
-        accelerometer, force_sensor, shaker, acquisition: names of presets.
+        noise_percent: white noise on every output, in percent of its RMS.
+        accelerometer, velocity_sensor, displacement_sensor, force_sensor, shaker, acquisition: name of a preset, or a
+            table of settings that may start from one (preset = "…").
     """
 
     noise_percent: Bound | None = None
-    accelerometer: str | None = None
-    force_sensor: str | None = None
-    shaker: str | None = None
-    acquisition: str | None = None
+    accelerometer: Choice | None = None
+    velocity_sensor: Choice | None = None
+    displacement_sensor: Choice | None = None
+    force_sensor: Choice | None = None
+    shaker: Choice | None = None
+    acquisition: Choice | None = None
 
 
 class Identification(Table):

@@ -1,0 +1,95 @@
+"""What a user gets to see of a result: numbers, a report, and the structure in motion."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+import numpy as np
+
+from identification.recording import Recording
+from lab.excitation import Excitation, Load, Sampling
+from lab.files.results import save_result
+from lab.result import Result
+from lab.rig import Rig
+from lab.scenario import Scenario
+from lab.simulate import Motion, motion
+
+PERIODS_SHOWN = 20
+"""Length of the motion kept for the viewer, in periods of the lowest mode."""
+
+
+def present(
+    folder: Path,
+    result: Result,
+    recording: Recording,
+    *,
+    command: str = "",
+    scenario: Scenario | None = None,
+    rig: Rig | None = None,
+) -> None:
+    """Write result.json, report.html and run.rrd into a folder.
+
+    Args:
+        folder: to write into.
+        result: what to tell.
+        recording: what it was identified from.
+        command: how the lab was called.
+        scenario: the test behind it, if there is one.
+        rig: the rig behind it, if there is one.
+    """
+    # Imported here because drawing is slow to load and `lab` must come up without it.
+    from lab.show.report import write_report
+    from lab.show.rerun_log import write_rrd
+
+    save_result(result, folder / "result.json")
+    write_report(
+        folder / "report.html",
+        result,
+        recording,
+        scenario_text=scenario.text if scenario else "",
+        command=command,
+        facts=_facts(recording, rig),
+    )
+    moved = _first_swings(rig, scenario) if rig and scenario else None
+    write_rrd(folder / "run.rrd", result, recording, rig=rig, motion=moved)
+
+
+def _facts(recording: Recording, rig: Rig | None) -> dict[str, str]:
+    facts = {
+        "Records": f"{len(recording.records)}, together {recording.duration:g} s",
+        "Sample rate": f"{recording.sample_rate:g} Hz",
+        "Inputs": ", ".join(channel.name for channel in recording.inputs) or "none",
+        "Outputs": ", ".join(channel.name for channel in recording.outputs),
+    }
+    if rig is not None:
+        facts["Model"] = f"{rig.name}: {', '.join(rig.dofs)}"
+    for name, value in recording.attributes.items():
+        facts[name.replace("_", " ").capitalize()] = value if isinstance(value, str) else f"{value:g}"
+    return facts
+
+
+def _first_swings(rig: Rig, scenario: Scenario) -> Motion:
+    """The start of the first record, long enough to watch."""
+    test = scenario.test
+    lowest = rig.second_order().modes().frequency_hz[:1]
+    enough = PERIODS_SHOWN / lowest[0] if lowest.size else test.duration
+    return motion(
+        rig,
+        _Start(scenario.drive(), round(test.duration * test.sample_rate)),
+        sample_rate=test.sample_rate,
+        duration=min(test.duration, enough),
+        seed=scenario.seed,
+    )
+
+
+@dataclass(frozen=True)
+class _Start(Excitation):
+    """The start of a longer test: what a sweep or multisine does depends on the whole length."""
+
+    whole: Excitation
+    n_samples: int
+
+    def loads(self, rig: Rig, sampling: Sampling, rng: np.random.Generator) -> list[Load]:
+        loads = self.whole.loads(rig, replace(sampling, n_samples=self.n_samples), rng)
+        return [replace(load, n_samples=sampling.n_samples) for load in loads]

@@ -1,0 +1,158 @@
+"""The whole flow on one page: a scenario or a recording in, a folder with data, result and pictures out."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import replace
+from functools import partial
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from identification.identify import identify
+from identification.recording import Recording
+from lab.compare import compare
+from lab.criteria import judge
+from lab.excitation import Sampling
+from lab.files.folder import output_folder
+from lab.files.recording import load
+from lab.instruments import instrument
+from lab.present import present
+from lab.result import Result
+from lab.rig import Rig
+from lab.scenario import Scenario, load_scenario
+from lab.simulate import simulate_to_file
+
+Progress = Callable[..., None]
+"""Called with the number of samples simulated since the last call, and `total`, how many there are in all."""
+
+
+def run(
+    scenario: Scenario | str | Path,
+    out: str | Path,
+    *,
+    force: bool = False,
+    command: str = "",
+    progress: Progress | None = None,
+) -> Result:
+    """What a virtual test comes to: simulated, measured, identified, compared with the truth, reported.
+
+    Args:
+        scenario: the test, or the file that defines it.
+        out: folder to come, with recording.h5, result.json, report.html and run.rrd.
+        force: replace an earlier output there.
+        command: how the test was called, for the report.
+        progress: told how far the simulation is.
+
+    Raises:
+        LabError, IdentificationError: something in the scenario is wrong, or the folder cannot be written.
+    """
+    if not isinstance(scenario, Scenario):
+        scenario = load_scenario(scenario)
+    with output_folder(out, force=force) as folder:
+        rig = rig_of(scenario)
+        _record(folder / "recording.h5", rig, scenario, progress)
+        recording = load(folder / "recording.h5")
+        chosen = scenario.identification
+        result = examine(recording, chosen.method, order=chosen.order, **chosen.settings)
+        result = replace(held_against(rig, result, scenario), title=scenario.title)
+        present(folder, result, recording, scenario=scenario, rig=rig, command=command)
+    return result
+
+
+def identify_file(
+    path: str | Path,
+    out: str | Path,
+    *,
+    method: str | None = None,
+    order: int | None = None,
+    force: bool = False,
+    command: str = "",
+    **settings: Any,
+) -> Result:
+    """What a recording file tells by itself: modes, and M, C, K where the set-up allows.
+
+    Args:
+        path: recording file.
+        out: folder to come, with result.json, report.html and run.rrd.
+        method: name, as in `lab list methods`; chosen from the data when None.
+        order: number of states; chosen from the data when None.
+        force: replace an earlier output there.
+        command: how the lab was called, for the report.
+        settings: further settings of the method.
+
+    Raises:
+        LabError, IdentificationError: the file or the request is wrong, or the folder cannot be written.
+    """
+    with output_folder(out, force=force) as folder:
+        recording = load(path)
+        result = examine(recording, method, order=order, **settings)
+        present(folder, result, recording, command=command)
+    return result
+
+
+def rig_of(scenario: Scenario) -> Rig:
+    """The rig that a scenario describes, its instruments on and its channels connected."""
+    rig = Rig.load(scenario.model_file())
+    wanted = scenario.channels
+    # An axis across all motion would only record rounding errors.
+    outputs = rig.responding if wanted.outputs is None else wanted.outputs
+    rig = rig.connected(inputs=wanted.inputs, outputs=outputs)
+    instruments = {name: value for name, value in scenario.instruments if value is not None}
+    return instrument(rig, **instruments, sample_rate=scenario.test.sample_rate) if instruments else rig
+
+
+def examine(
+    recording: Recording, method: str | None = None, *, order: int | None = None, **settings: Any
+) -> Result:
+    """The result of identifying a recording, without any truth beside it.
+
+    Raises:
+        IdentificationError: the recording or the request is at fault.
+    """
+    found = identify(recording, method, order=order, **settings)
+    return Result(
+        title=recording.title,
+        sample_rate=recording.sample_rate,
+        modes=found.modes.normalized(),
+        stable=tuple(found.stable),
+        second_order=found.second_order,
+        realization=found.realization,
+        stabilization=found.stabilization,
+        warnings=tuple(found.warnings),
+        notes=tuple(found.notes),
+    )
+
+
+def held_against(rig: Rig, result: Result, scenario: Scenario) -> Result:
+    """The result with the rig's truth beside it, and the scenario's criteria judged."""
+    truth, matrices = rig.modes().normalized(), rig.second_order()
+    comparison = compare(truth, result.modes, matrices, result.second_order)
+    return replace(
+        result,
+        truth_modes=truth,
+        truth_second_order=matrices,
+        comparison=comparison,
+        criteria=judge(scenario.criteria.model_dump(), comparison),
+    )
+
+
+def _record(path: Path, rig: Rig, scenario: Scenario, progress: Progress | None) -> None:
+    drive, test = scenario.drive(), scenario.test
+    told = None
+    if progress is not None:
+        sampling = Sampling(test.sample_rate, round(test.duration * test.sample_rate))
+        one_run = drive.loads(rig, sampling, np.random.default_rng(scenario.seed))
+        told = partial(progress, total=test.runs * sum(load.n_samples for load in one_run))
+    simulate_to_file(
+        path,
+        rig,
+        drive,
+        sample_rate=test.sample_rate,
+        duration=test.duration,
+        n_runs=test.runs,
+        seed=scenario.seed,
+        accuracy=test.accuracy,
+        progress=told,
+    )
