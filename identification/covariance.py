@@ -1,8 +1,8 @@
-"""Covariances between outputs at different times: all that a stationary random response tells about the structure.
+"""Covariances between outputs at different times: all that a stationary random response tells.
 
-Under white excitation the covariances R_k = E[y_{j+k} y_jᵀ] obey R_k = C A^{k-1} G for k >= 1, like the pulse
-responses of a system with the structure's own poles and shapes. Lag zero does not: it carries the variance of the
-measurement noise, and is therefore left out unless asked for.
+Under white excitation the covariances R_k = E[y_{j+k} y_jᵀ] obey R_k = C A^{k-1} G for k >= 1, like the
+pulse responses of a system with the structure's own poles and shapes. Lag zero does not: it carries the
+variance of the measurement noise, and is therefore left out unless asked for.
 """
 
 from __future__ import annotations
@@ -17,7 +17,7 @@ from identification.errors import IdentificationError, RecordingError, TooShortE
 from identification.recording import Array, Record, Recording
 
 SEGMENTS = 16
-"""Segments transformed at a time: enough to spread the cost of adding up spectra, few enough to stay in the cache."""
+"""Segments transformed at a time: enough to spread the cost of adding spectra, few enough for the cache."""
 
 
 def output_covariances(
@@ -25,9 +25,9 @@ def output_covariances(
 ) -> Array:
     """Covariances R_k = E[y_{j+k} y_ref_jᵀ] of the outputs with the reference outputs, lag by lag.
 
-    Each record loses its own mean, and no product reaches from one record into another. The sum over a record of N
-    samples has N - k terms; the total over all records is divided by the total number of terms, because a division by
-    N would multiply R_k by (1 - k/N) and so add damping that is not there.
+    Each record loses its own mean, and no product reaches from one record into another. The sum over a
+    record of N samples has N - k terms; the total over all records is divided by the total number of terms,
+    because a division by N would multiply R_k by (1 - k/N) and so add damping that is not there.
 
     Args:
         recording: outputs are read block by block, so that a recording on disk may exceed the memory.
@@ -43,17 +43,19 @@ def output_covariances(
         TooShortError: the longest record is not longer than the largest lag.
         RecordingError: a reference does not exist, or a sample is missing.
 
-    Source: Peeters and De Roeck (1999), Mech. Syst. Signal Process. 13(6), eq. (22); Cambraia and Kurka (2010), eq. (26).
+    Source: Cambraia and Kurka (2010), VI CONEM, eq. (26) and (28); Peeters and De Roeck (1999), Mech. Syst.
+        Signal Process. 13(6).
     """
     if n_lags < 1 or first_lag < 0:
         raise IdentificationError(
-            f"{n_lags} lags from lag {first_lag} on were asked for; expected at least one lag, from lag 0 or later on"
+            f"{n_lags} lags from lag {first_lag} on were asked for; expected at least one lag, from lag 0 on"
         )
     n = first_lag + n_lags - 1
     longest = max(record.n_samples for record in recording.records)
     if longest <= n:
         raise TooShortError(
-            f"lag {n} needs a record of more than {n} samples and the longest has {longest}; ask for fewer lags"
+            f"lag {n} needs a record of more than {n} samples and the longest has {longest}; "
+            "ask for fewer lags (fewer block rows) or record for longer"
         )
     rows = reference_rows(recording, references)
     total = np.zeros((n + 1, len(recording.outputs), rows.size))
@@ -89,10 +91,10 @@ def reference_rows(recording: Recording, references: Sequence[str] | None) -> ND
 
 
 def _products(record: Record, rows: NDArray[np.intp], n: int) -> Array:
-    """Σ_j (y_{j+k} - ȳ)(y_ref_j - ȳ_ref)ᵀ over one record for k = 0 … n, shape (n + 1, n_outputs, n_references).
+    """Σ_j (y_{j+k} - ȳ)(y_ref_j - ȳ_ref)ᵀ over one record, shape (n + 1, n_outputs, n_references).
 
-    The record is cut into segments: the references of `step` samples with the outputs of the same and n more samples.
-    Both are padded to the length of one fast Fourier transform, and their cross-spectra add up over the segments.
+    The record is cut into segments: the references of `step` samples with the outputs of the same and n more
+    samples. Both get the length of one fast Fourier transform, and their cross-spectra add up.
     """
     n_outputs = record.outputs.shape[0]
     length = _transform_length(n, record.n_samples, n_outputs * rows.size)
@@ -100,13 +102,11 @@ def _products(record: Record, rows: NDArray[np.intp], n: int) -> Array:
     size = 1 << (SEGMENTS * step - 1).bit_length()
     spectrum = np.zeros((length // 2 + 1, n_outputs, rows.size), complex)
     # Taking off a nearby constant first keeps a large offset from eating the digits of a small vibration.
-    offset = np.zeros((n_outputs, 1))
+    offset = np.mean(next(record.blocks(size))[1], axis=1, keepdims=True)
     pending = np.empty((n_outputs, 0))
     head = np.empty((n_outputs, 0))
     total = np.zeros(n_outputs)
     for _, block in record.blocks(size):
-        if not pending.shape[1]:
-            offset = np.mean(block, axis=1, keepdims=True)
         block = block - offset
         total += np.sum(block, axis=1)
         if head.shape[1] < n:
@@ -117,20 +117,20 @@ def _products(record: Record, rows: NDArray[np.intp], n: int) -> Array:
             spectrum += _cross_spectrum(pending, rows, n_segments, step, length)
             pending = pending[:, n_segments * step :]
     tail = pending[:, max(pending.shape[1] - n, 0) :].copy()
-    n_segments = -(-pending.shape[1] // step)
+    n_segments = max(-(-pending.shape[1] // step), 1)
     pending = np.pad(pending, ((0, 0), (0, n_segments * step + n - pending.shape[1])))
     spectrum += _cross_spectrum(pending, rows, n_segments, step, length)
     products = scipy.fft.irfft(spectrum, length, axis=0, overwrite_x=True)[: n + 1]
-    return products - _mean_part(total, head, tail, rows, record.n_samples)
+    return np.asarray(products - _mean_part(total, head, tail, rows, record.n_samples))
 
 
 def _transform_length(n: int, n_samples: int, n_pairs: int) -> int:
     """A power of two of several times the largest lag, as long as the cross-spectra fit in about 64 MiB."""
     largest = max(1 << 22, n_pairs) // n_pairs
-    length = 1 << max(n, 127).bit_length()
-    while length < min(8 * n, n_samples) and length < largest:
+    length = 1 << max(2 * n, 127).bit_length()
+    while length < min(8 * n, n_samples, largest):
         length *= 2
-    return length if length > n + 1 else 2 * length
+    return length
 
 
 def _cross_spectrum(
