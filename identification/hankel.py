@@ -90,3 +90,62 @@ def shift_invariance(
         A = scipy.linalg.solve_triangular(R[:n, :n], X[:n, :n])
         systems.append((A * root[:n] / root[:n, None], U[:n_outputs, :n] * root[:n]))
     return systems
+
+
+def choose_order(P: Array, S: Array, Q: Array, *, n_outputs: int, n_inputs: int) -> tuple[int, str]:
+    """The number of states that the singular values of a Hankel matrix show, and the reason in one sentence.
+
+    Calculated data fall off a cliff: the last fall by a factor of 1000 or more to below 1e-8 of the
+    largest value ends the signal. Measured data end in a floor of noise. What is left beyond an order
+    n, taken for noise with a variance of its own in each output and each input, has no singular value
+    much above the root of the largest mean square of a row plus that of a column. The order is the
+    first one whose next value is within 1.3 times that edge (the margin covers the repetition of
+    entries in a Hankel matrix), made even as an oscillation takes two states.
+
+    Args:
+        P: left singular vectors in columns, shape (n_rows * n_outputs, n_values).
+        S: all singular values, largest first, shape (n_values,).
+        Q: right singular vectors in columns, shape (n_columns * n_inputs, n_values).
+        n_outputs: rows of a block.
+        n_inputs: columns of a block.
+
+    Raises:
+        OrderError: the matrix is zero.
+
+    Source: Bandeira and van Handel (2016), Ann. Probab. 44(4), the norm of a matrix of unequal
+    independent noise.
+    """
+    rows, columns = P.shape[0], Q.shape[0]
+    s = np.maximum(S, np.finfo(float).eps * max(rows, columns) * S[0])
+    if s[0] == 0:
+        raise OrderError("all singular values are zero: the data hold no response; check the channels")
+    cliffs = np.flatnonzero((s[:-1] >= 1e3 * s[1:]) & (s[1:] <= 1e-8 * s[0]))
+    if cliffs.size:
+        order = int(cliffs[-1]) + 1
+        return order, (
+            f"order {order} is where the singular values fall from {s[order - 1] / s[0]:.1e} to "
+            f"{s[order] / s[0]:.1e} of the largest"
+        )
+    n = np.arange(s.size // 2 + 1)
+    share = rows * columns / ((rows - n) * (columns - n))  # the singular vectors kept took noise with them
+    row = share * _largest_mean_square(P, s, n_outputs)[n]
+    column = share * _largest_mean_square(Q, s, n_inputs)[n]
+    edge = 1.3 * (np.sqrt(row) + np.sqrt(column))
+    below = np.flatnonzero(s[n] <= edge)
+    if not below.size:
+        order = max(2 * int(n[-1] // 2), 1)
+        return order, f"order {order}: no edge of noise in sight, so the Hankel matrix may be too small"
+    last = int(below[0])
+    if last == 0:
+        return 2, "order 2: no singular value stands above the noise, so the data hardly show an oscillation"
+    order = min(last + last % 2, s.size)
+    return order, (
+        f"order {order}: singular value {last} is the last above the edge of the noise, "
+        f"{edge[last] / s[0]:.1e} of the largest"
+    )
+
+
+def _largest_mean_square(vectors: Array, s: Array, n_channels: int) -> Array:
+    """Mean square of a row of the noisiest channel in what is left beyond each order, shape (n_values,)."""
+    power = np.mean(np.square(vectors).reshape(-1, n_channels, s.size), axis=0) * s**2
+    return np.asarray(np.max(np.cumsum(power[:, ::-1], axis=1)[:, ::-1], axis=0))

@@ -19,7 +19,7 @@ Complex = NDArray[np.complex128]
 
 @dataclass(frozen=True, eq=False, repr=False)
 class MarkovParameters:
-    """Responses to a unit pulse held for one sample: D, CB, CAB, CA²B, …
+    """Responses to a unit pulse held for one sample: D, CB, CAB, CA²B and so on.
 
     Attributes:
         values: shape (n_lags, n_outputs, n_inputs) [output unit / input unit].
@@ -37,13 +37,18 @@ class MarkovParameters:
         object.__setattr__(self, "values", frozen(self.values))
         if self.values.ndim != 3 or self.values.shape[1:] != (len(self.outputs), len(self.inputs)):
             raise IdentificationError(
-                f"Markov parameters have shape {self.values.shape}; expected (n_lags, {len(self.outputs)}, {len(self.inputs)})"
+                f"Markov parameters have shape {self.values.shape}; expected (n_lags, {len(self.outputs)}, "
+                f"{len(self.inputs)})"
+            )
+        if not np.all(np.isfinite(self.values)):
+            raise IdentificationError(
+                "Markov parameters are not all finite; leave the channel or the lags out"
             )
 
     @property
     def n_lags(self) -> int:
         """Number of Markov parameters, the direct term D included."""
-        return self.values.shape[0]
+        return int(self.values.shape[0])
 
     def __repr__(self) -> str:
         n_lags, n_outputs, n_inputs = self.values.shape
@@ -84,10 +89,10 @@ class StateSpace:
     @property
     def n_states(self) -> int:
         """Number of states."""
-        return self.A.shape[0]
+        return int(self.A.shape[0])
 
     def eigen(self) -> tuple[Complex, Complex]:
-        """Continuous-time poles λ [rad/s], shape (n_states,), and eigenvectors of A, shape (n_states, n_states)."""
+        """Continuous-time poles λ [rad/s], (n_states,), and eigenvectors of A, (n_states, n_states)."""
         z, vectors = scipy.linalg.eig(self.A)
         if self.dt == 0.0:
             return z, vectors
@@ -95,7 +100,7 @@ class StateSpace:
             return np.log(z.astype(complex)) / self.dt, vectors
 
     def modes(self) -> Modes:
-        """Oscillating modes: one for each conjugate pair of poles, sorted by frequency; real poles have none."""
+        """Oscillating modes, one for each conjugate pair of poles, sorted by frequency."""
         poles, vectors = self.eigen()
         # A sampled pole on the negative real axis has an imaginary logarithm but no partner: not a mode.
         own = poles.imag > 1e-12 * np.abs(poles)
@@ -104,7 +109,7 @@ class StateSpace:
         return Modes.from_poles(poles[own], self.C @ vectors[:, own], self.outputs)
 
     def markov(self, n_lags: int) -> MarkovParameters:
-        """The first `n_lags` Markov parameters of a sampled model: D, CB, CAB, …
+        """The first `n_lags` Markov parameters of a sampled model: D, CB, CAB and so on.
 
         Raises:
             IdentificationError: the model is continuous in time.
@@ -119,14 +124,22 @@ class StateSpace:
         return MarkovParameters(values, self.dt, self.inputs, self.outputs)
 
     def frequency_response(self, frequency_hz: Array) -> Complex:
-        """H(f) = C (s I - A)⁻¹ B + D, shape (n_frequencies, n_outputs, n_inputs); z = exp(i 2π f dt) when sampled."""
+        """H(f) = C (s I - A)⁻¹ B + D with s = i 2π f, or z = exp(i 2π f dt) in its place when sampled.
+
+        Returns:
+            Shape (n_frequencies, n_outputs, n_inputs).
+        """
         s = 2j * np.pi * np.asarray(frequency_hz)
         points = np.exp(s * self.dt) if self.dt else s
         eye = np.eye(self.n_states)
         return np.stack([self.C @ np.linalg.solve(p * eye - self.A, self.B) + self.D for p in points])
 
     def simulate(self, inputs: Array, initial: Array | None = None) -> Array:
-        """Outputs (n_outputs, n_samples) of a sampled model under inputs (n_inputs, n_samples), from state `initial`.
+        """Outputs (n_outputs, n_samples) of a sampled model under inputs (n_inputs, n_samples).
+
+        Args:
+            inputs: held over each sample.
+            initial: state at the first sample; rest when None.
 
         Raises:
             IdentificationError: the model is continuous in time.
@@ -148,7 +161,9 @@ class StateSpace:
             IdentificationError: the model is sampled already.
         """
         if self.dt:
-            raise IdentificationError(f"the model is sampled at dt = {self.dt} s already; expected a continuous one")
+            raise IdentificationError(
+                f"the model is sampled at dt = {self.dt} s already; expected a continuous one"
+            )
         n, m = self.B.shape
         block = scipy.linalg.expm(np.block([[self.A, self.B], [np.zeros((m, n + m))]]) * dt)
         return replace(self, A=block[:n, :n], B=block[:n, n:], dt=dt)
@@ -157,7 +172,8 @@ class StateSpace:
         """The continuous model whose zero-order-hold samples this is: A_c = ln(A) / dt.
 
         Raises:
-            IdentificationError: a pole lies on the negative real axis or at zero, where the logarithm is not real.
+            IdentificationError: a pole lies on the negative real axis or at zero, where the logarithm
+                is not real.
         """
         if not self.dt:
             return self
@@ -178,7 +194,8 @@ class StateSpace:
 
     def __repr__(self) -> str:
         time = f"dt = {self.dt:g} s" if self.dt else "continuous"
-        return f"StateSpace({self.n_states} states, {len(self.outputs)} outputs, {len(self.inputs)} inputs, {time})"
+        sides = f"{len(self.outputs)} outputs, {len(self.inputs)} inputs"
+        return f"StateSpace({self.n_states} states, {sides}, {time})"
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -190,7 +207,8 @@ class SecondOrder:
         damping: shape (n_dofs, n_dofs) [N s/m].
         stiffness: shape (n_dofs, n_dofs) [N/m].
         dofs: names of the degrees of freedom.
-        mass_std, damping_std, stiffness_std: one standard deviation of each entry; None where none was estimated.
+        mass_std, damping_std, stiffness_std: one standard deviation of each entry; None where none was
+            estimated.
     """
 
     mass: Array
@@ -258,8 +276,8 @@ class SecondOrder:
 class Realization:
     """State-space models of every order up to a highest one, from one factorization of the data.
 
-    Leading columns of an observability matrix give the model of any lower order, so one decomposition serves a whole
-    stabilization diagram.
+    Leading columns of an observability matrix give the model of any lower order, so one decomposition
+    serves a whole stabilization diagram.
 
     Attributes:
         method: name of the method, as in `METHODS`.
