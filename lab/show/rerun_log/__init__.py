@@ -1,0 +1,150 @@
+"""A result as one Rerun recording that opens laid out. The only place that imports rerun.
+
+One file per thing shown: `channels` and `scene` make the Test tab, `modes` and `stabilization` the Modes tab,
+and `matrices` the other two. Each logs its entities and returns the views that show them.
+"""
+
+from __future__ import annotations
+
+import re
+import uuid
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import numpy as np
+import rerun as rr
+import rerun.blueprint as rrb
+
+from identification.recording import Recording
+from lab.result import Result
+from lab.show.rerun_log.channels import log_channels
+from lab.show.rerun_log.matrices import log_mac, log_matrices
+from lab.show.rerun_log.modes import log_modes
+from lab.show.rerun_log.plot import plain
+from lab.show.rerun_log.scene import TIMELINE, log_motion, motion_frames
+from lab.show.rerun_log.stabilization import log_stabilization
+from lab.show.verdict import mode_rows, verdict
+
+if TYPE_CHECKING:
+    from lab.rig import Rig
+    from lab.simulate import Motion
+
+MAX_SERIES = 6
+"""Time-series views stacked before they get too thin to read."""
+
+
+def write_rrd(
+    path: str | Path,
+    result: Result,
+    recording: Recording,
+    *,
+    rig: Rig | None = None,
+    motion: Motion | None = None,
+) -> None:
+    """Writes one .rrd file with its layout saved in it.
+
+    Args:
+        path: file to come.
+        result: what was identified.
+        recording: what it was identified from; long records are drawn as minimum and maximum envelopes.
+        rig: the structure, to be drawn in three dimensions.
+        motion: how it moved, starting with the first record.
+    """
+    title = result.title or "untitled"
+    # The viewer keeps one layout per application, so each test is an application of its own.
+    application = "modal lab " + re.sub(r"[^A-Za-z0-9]+", "-", title)
+    stream = rr.RecordingStream(application, recording_id=uuid.uuid4())
+    try:
+        stream.save(path)
+        stream.send_recording_name(title)
+        stream.log(
+            "summary", rr.TextDocument(_summary(result), media_type=rr.MediaType.MARKDOWN), static=True
+        )
+        shown = (
+            motion_frames(motion, result.modes.frequency_hz)
+            if rig is not None and motion is not None
+            else None
+        )
+        end = float(motion.time[shown[-1]]) if motion is not None and shown is not None else 0.0
+        scene = log_motion(stream, rig, motion, shown) if rig is not None and motion is not None else []
+        tabs = [
+            _test_tab(scene, log_channels(stream, recording)),
+            _modes_tab(log_modes(stream, result, rig, end), log_stabilization(stream, result, recording)),
+            _matrices_tab(log_matrices(stream, result), result),
+            _grid("MAC", log_mac(stream, result), 2),
+        ]
+        stream.send_blueprint(
+            rrb.Blueprint(
+                rrb.Tabs(*[tab for tab in tabs if tab is not None]),
+                rrb.BlueprintPanel(state="collapsed"),
+                rrb.SelectionPanel(state="collapsed"),
+                _time_panel(result, end),
+            )
+        )
+    finally:
+        stream.disconnect()
+
+
+def _test_tab(scene: list[rrb.View], series: list[rrb.View]) -> rrb.Container:
+    summary = rrb.TextDocumentView(origin="/summary", name="Summary")
+    left = rrb.Vertical(*scene, summary, row_shares=[3] * len(scene) + [2]) if scene else summary
+    return rrb.Horizontal(left, rrb.Vertical(*series[:MAX_SERIES]), column_shares=[2, 3], name="Test")
+
+
+def _modes_tab(modes: list[rrb.View], stabilization: list[rrb.View]) -> rrb.Container | None:
+    if not modes and not stabilization:
+        return None
+    shapes = [rrb.Grid(*modes, grid_columns=min(len(modes), 3 if len(modes) != 4 else 2))] if modes else []
+    shares = [3 if len(modes) <= 3 else 2] * len(shapes) + [2 if len(modes) <= 3 else 1] * len(stabilization)
+    return rrb.Vertical(*shapes, *stabilization, name="Modes", row_shares=shares)
+
+
+def _matrices_tab(views: list[rrb.View], result: Result) -> rrb.Container | None:
+    """All nine at once while their numbers fit, else M, C and K behind tabs of their own."""
+    if len(views) < 9:
+        return _grid("Matrices", views, len(views))
+    if result.second_order is not None and len(result.second_order.dofs) <= 4:
+        return _grid("Matrices", views, 3)
+    rows = [rrb.Horizontal(*views[i : i + 3], name=letter) for i, letter in ((0, "M"), (3, "C"), (6, "K"))]
+    return rrb.Tabs(*rows, name="Matrices")
+
+
+def _grid(name: str, views: list[rrb.View], columns: int) -> rrb.Container | None:
+    return rrb.Grid(*views, grid_columns=min(columns, len(views)), name=name) if views else None
+
+
+def _time_panel(result: Result, end: float) -> rrb.TimePanel:
+    """The lowest mode swings about once in two seconds; the stretch with moving pictures runs in a loop."""
+    if end <= 0:
+        return rrb.TimePanel(state="collapsed", timeline=TIMELINE)
+    lowest = float(np.min(result.modes.frequency_hz)) if len(result.modes) else 0.5
+    selection = rrb.components.AbsoluteTimeRange(0, round(1e9 * end))
+    return rrb.TimePanel(
+        state="collapsed",
+        timeline=TIMELINE,
+        playback_speed=float(f"{0.5 / lowest:.1g}") if lowest > 0 else 1.0,
+        loop_mode="selection",
+        time_selection=selection,
+        play_state="playing",
+    )
+
+
+def _summary(result: Result) -> str:
+    """Verdict and modes in Markdown."""
+    lines = [f"# {plain(result.title)}", "", plain(verdict(result).sentence), ""]
+    if len(result.modes):
+        lines += [
+            "| Mode | Frequency [Hz] | Damping [%] | Error in frequency | MAC |",
+            "|---:|---:|---:|---:|---:|",
+        ]
+    for row in mode_rows(result):
+        if row.frequency is None or row.damping is None:
+            lines.append(f"| missed | ({row.true_frequency:.5g}) | | | |")
+            continue
+        error = "" if row.frequency_error is None else f"{row.frequency_error:.1e}"
+        agreement = "" if row.mac is None else f"{row.mac:.4f}"
+        lines.append(
+            f"| {row.number} | {row.frequency:.5g} | {100 * row.damping:.4g} | {error} | {agreement} |"
+        )
+    lines += ["", *[f"- {plain(warning)}" for warning in result.warnings]]
+    return "\n".join(lines)
