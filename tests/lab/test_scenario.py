@@ -132,7 +132,7 @@ def test_files_that_are_no_scenario(tmp_path):
     (tmp_path / "picture.toml").write_bytes(b"\x89PNG\xff")
     with pytest.raises(FileError, match="is not text"):
         load_scenario(tmp_path / "picture.toml")
-    with pytest.raises(UnknownNameError, match=r"model .nowhere\.xml. is neither a file nor in the catalogue"):
+    with pytest.raises(UnknownNameError, match=r"'nowhere.xml' is neither a file nor in"):
         load_scenario(written(tmp_path, PLAIN.replace("chain3_uncoupled", "nowhere"))).model_file()
 
 
