@@ -119,9 +119,12 @@ def paper_chain3(damping: str = "uncoupled") -> StateSpace:
 
 
 def paper_truss(dt: float = 0.02) -> StateSpace:
-    """The experiment of De Angelis et al. (2002), 5.4, sampled: five accelerometers and four forces."""
+    """De Angelis et al. (2002), 5.4, sampled: five accelerometers and four forces.
+
+    The text names v4 as the fifth sensor, which would leave u4 without any; eq. (24) uses row 7, which is u4.
+    """
     system = instrumented(
-        truss(), sensors(("u1", "v1", "v2", "v3", "v4")), actuators(("v1", "u2", "u3", "v4"))
+        truss(), sensors(("u1", "v1", "v2", "v3", "u4")), actuators(("v1", "u2", "u3", "v4"))
     )
     return system.sampled(dt)
 
