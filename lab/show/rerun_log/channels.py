@@ -20,11 +20,15 @@ def log_channels(stream: rr.RecordingStream, recording: Recording) -> list[rrb.V
     envelopes = [envelope(record, recording.sample_rate) for record in recording.records]
     lengths = [record.n_samples / recording.sample_rate for record in recording.records]
     starts = np.concatenate([[0.0], np.cumsum(lengths)])
+    first, last = rr.TimeRangeBoundary.absolute(seconds=0.0), rr.TimeRangeBoundary.absolute(seconds=starts[-1])
+    whole = rrb.TimeAxis(link="Independent", view_range=rr.TimeRange(start=first, end=last))
     views: list[rrb.View] = []
     sides: list[tuple[str, tuple[Channel, ...]]] = [
         ("inputs", recording.inputs),
         ("outputs", recording.outputs),
     ]
+    first, last = (rr.TimeRangeBoundary.absolute(seconds=float(t)) for t in (0.0, starts[-1]))
+    whole = rrb.TimeAxis(view_range=rr.TimeRange(start=first, end=last))
     for side, channels in sides:
         signals = [getattr(part, side) for part in envelopes]
         for unit, rows in by_unit(channels).items():
@@ -49,7 +53,9 @@ def log_channels(stream: rr.RecordingStream, recording: Recording) -> list[rrb.V
             quantity = channels[rows[0]].quantity
             legend = rrb.PlotLegend(corner="RightTop")
             views.append(
-                rrb.TimeSeriesView(origin=origin, name=f"{quantity} [{unit}], {side}", plot_legend=legend)
+                rrb.TimeSeriesView(
+                    origin=origin, name=f"{quantity} [{unit}], {side}", plot_legend=legend, axis_x=whole
+                )
             )
     return views
 
