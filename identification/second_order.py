@@ -140,8 +140,9 @@ def _continuous(z: Complex, dt: float) -> Complex:
         return np.asarray(z, dtype=complex)
     if np.any((z.imag == 0) & (z.real <= 0)):
         raise NotSecondOrderError(
-            "a sampled pole lies on the negative real axis, where no structure has one; "
-            "change the order or sample faster"
+            "a sampled pole lies on the negative real axis, where no structure has one, so the data do not "
+            "show "
+            f"{z.size / 2:g} modes; lower the order, excite the missing modes or sample faster"
         )
     return np.asarray(np.log(z.astype(complex)) / dt)
 
