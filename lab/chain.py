@@ -1,0 +1,455 @@
+"""Measurement chain: what actuators, sensors and data acquisition do to the signals between desk and structure.
+
+A chain is a list of stages in each of four places, in the order in which the signal passes them:
+
+    command -> actuators -> force on the structure -> motion -> sensors -> acquisition -> recorded output
+                                 `-> force_sensors -> recorded input
+
+Stages of `actuators` see forces at every substep of the simulation, shape (3, n): at its start, on average (which is what
+acts), and at its end. Stages of `sensors` see the signal at every instant between substeps, shape (3, n): as the substep
+before it ends, as the substep after it starts, both under the mean force of that substep, and at the instant itself.
+Stages of `force_sensors` and `acquisition` see samples, shape (n,). The default chain is ideal: it has no stage, and the recorded input is the commanded force.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+import json
+import math
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, fields
+from typing import Any, ClassVar
+
+import numpy as np
+import scipy.signal
+
+from identification.recording import Array
+from lab.errors import RigError, UnknownNameError
+
+Process = Callable[[Array], Array]
+"""Turns the next block of a signal into what leaves the stage; remembers the blocks before."""
+
+ALL = "*"
+"""Stands for every channel."""
+
+
+@dataclass(frozen=True)
+class Stage:
+    """One thing that happens to a signal.
+
+    Attributes:
+        channel: name of the channel it happens to, or "*" for every channel.
+    """
+
+    name: ClassVar[str] = ""
+    channel: str
+
+    def start(self, dt: float, rng: np.random.Generator, rms: float) -> Process:
+        """A process for one channel of one record.
+
+        Args:
+            dt: time between values of the signal [s].
+            rng: source of the stage's randomness.
+            rms: root mean square of the signal over the whole record, where known.
+        """
+        raise NotImplementedError
+
+    def start_held(self, dt: float) -> Process:
+        """A process for one force, shape (3, n): just after the start, mean, and just before the end of each substep."""
+        return self.start(dt, np.random.default_rng(0), 0.0)
+
+    @property
+    def needs_substeps(self) -> bool:
+        """Whether the stage must see what happens between samples."""
+        return False
+
+    @property
+    def relative_noise(self) -> float:
+        """Random error as a share of the signal's RMS; infinite for a stage that adds none."""
+        return float("inf")
+
+    @property
+    def absolute_noise(self) -> float:
+        """Random error per sample at 1 Hz bandwidth or in the channel's unit; infinite for a stage that adds none."""
+        return float("inf")
+
+
+@dataclass(frozen=True)
+class Gain(Stage):
+    """Multiplies the signal by 1 + `relative_change`; -2 flips its sign."""
+
+    name: ClassVar[str] = "gain"
+    relative_change: float
+
+    def start(self, dt: float, rng: np.random.Generator, rms: float) -> Process:
+        return lambda x: x * (1 + self.relative_change)
+
+
+@dataclass(frozen=True)
+class Saturation(Stage):
+    """Clips the signal at ±`limit` [unit of the channel]."""
+
+    name: ClassVar[str] = "saturation"
+    limit: float
+
+    def start(self, dt: float, rng: np.random.Generator, rms: float) -> Process:
+        return lambda x: np.clip(x, -self.limit, self.limit)
+
+
+@dataclass(frozen=True)
+class Lag(Stage):
+    """First-order low-pass of corner frequency `corner_hz`; a lag of time constant 1 / (2π corner_hz)."""
+
+    name: ClassVar[str] = "lag"
+    corner_hz: float
+
+    @property
+    def needs_substeps(self) -> bool:
+        return True
+
+    def start(self, dt: float, rng: np.random.Generator, rms: float) -> Process:
+        return _low_pass(self.corner_hz, 1, dt)
+
+    def start_held(self, dt: float) -> Process:
+        return _held_low_pass(self.corner_hz, 1, dt)
+
+
+@dataclass(frozen=True)
+class LowPass(Stage):
+    """Butterworth low-pass of `order` with corner frequency `corner_hz`, as in an anti-alias filter."""
+
+    name: ClassVar[str] = "low_pass"
+    corner_hz: float
+    order: int = 2
+
+    @property
+    def needs_substeps(self) -> bool:
+        return True
+
+    def start(self, dt: float, rng: np.random.Generator, rms: float) -> Process:
+        return _low_pass(self.corner_hz, self.order, dt)
+
+    def start_held(self, dt: float) -> Process:
+        return _held_low_pass(self.corner_hz, self.order, dt)
+
+
+@dataclass(frozen=True)
+class Delay(Stage):
+    """Gives the signal `delay` seconds later; before the record it stood still."""
+
+    name: ClassVar[str] = "delay"
+    delay: float
+
+    @property
+    def needs_substeps(self) -> bool:
+        return True
+
+    def start(self, dt: float, rng: np.random.Generator, rms: float) -> Process:
+        whole, part = _delay_line(self.delay, dt)
+        past: Array | None = None
+
+        def process(x: Array) -> Array:
+            nonlocal past
+            if past is None:
+                past = np.full((3, whole + 1), x[0, 0])
+            line, n = np.concatenate([past, x], axis=1), x.shape[1]
+            past = line[:, n:]
+            earlier, late = line[:, :n], line[:, 1 : n + 1]
+            if not part:
+                return late
+            # Between two instants the signal runs from just after the earlier to just before the later.
+            mixed = part * earlier[1] + (1 - part) * late[0]
+            return np.stack([mixed, mixed, mixed])
+
+        return process
+
+    def start_held(self, dt: float) -> Process:
+        whole, part = _delay_line(self.delay, dt)
+        past = np.zeros((3, whole + 1))
+
+        def process(x: Array) -> Array:
+            nonlocal past
+            line, n = np.concatenate([past, x], axis=1), x.shape[1]
+            past = line[:, n:]
+            earlier, late = line[:, :n], line[:, 1 : n + 1]
+            if not part:
+                return late
+            return np.stack([earlier[2], part * earlier[1] + (1 - part) * late[1], late[0]])
+
+        return process
+
+
+@dataclass(frozen=True)
+class Hum(Stage):
+    """Adds a sine of `frequency_hz` and `amplitude` [unit of the channel]; `phase` [rad] at the start of the record."""
+
+    name: ClassVar[str] = "hum"
+    frequency_hz: float
+    amplitude: float
+    phase: float = 0.0
+
+    def start(self, dt: float, rng: np.random.Generator, rms: float) -> Process:
+        passed = 0
+
+        def process(x: Array) -> Array:
+            nonlocal passed
+            t = (passed + np.arange(x.shape[-1])) * dt
+            passed += x.shape[-1]
+            return x + self.amplitude * np.sin(2 * np.pi * self.frequency_hz * t + self.phase)
+
+        return process
+
+
+@dataclass(frozen=True)
+class Noise(Stage):
+    """Adds white Gaussian noise; the three kinds add up.
+
+    Attributes:
+        percent: standard deviation as a percentage of the record's own RMS in this channel.
+        std: standard deviation [unit of the channel].
+        density: spectral density [unit / √Hz], up to half the sample rate.
+    """
+
+    name: ClassVar[str] = "noise"
+    percent: float = 0.0
+    std: float = 0.0
+    density: float = 0.0
+
+    @property
+    def relative_noise(self) -> float:
+        return self.percent / 100 if self.percent else float("inf")
+
+    @property
+    def absolute_noise(self) -> float:
+        return float(np.hypot(self.std, self.density)) or float("inf")
+
+    def start(self, dt: float, rng: np.random.Generator, rms: float) -> Process:
+        variance = (self.percent / 100 * rms) ** 2 + self.std**2 + self.density**2 / (2 * dt)
+        sigma = np.sqrt(variance)
+        return lambda x: x + sigma * rng.standard_normal(x.shape)
+
+
+@dataclass(frozen=True)
+class Resolution(Stage):
+    """Rounds to whole multiples of `step` [unit of the channel], as a converter of finite bits does."""
+
+    name: ClassVar[str] = "resolution"
+    step: float
+
+    @property
+    def absolute_noise(self) -> float:
+        return self.step / np.sqrt(12)
+
+    def start(self, dt: float, rng: np.random.Generator, rms: float) -> Process:
+        return lambda x: np.round(x / self.step) * self.step
+
+
+@dataclass(frozen=True)
+class Dropout(Stage):
+    """Loses single samples with the given probability; a lost sample is NaN."""
+
+    name: ClassVar[str] = "dropout"
+    probability: float
+
+    def start(self, dt: float, rng: np.random.Generator, rms: float) -> Process:
+        return lambda x: np.where(rng.random(x.shape) < self.probability, np.nan, x)
+
+
+STAGES: dict[str, type[Stage]] = {
+    stage.name: stage for stage in (Gain, Saturation, Lag, LowPass, Delay, Hum, Noise, Resolution, Dropout)
+}
+PLACES = ("actuators", "sensors", "force_sensors", "acquisition")
+
+
+@dataclass(frozen=True, repr=False)
+class Chain:
+    """What lies between the recorded inputs, the structure and the recorded outputs.
+
+    Attributes:
+        inputs: names of the connected input channels; None for all.
+        outputs: names of the connected output channels; None for all.
+        swaps: pairs of output channels whose cables are exchanged.
+        actuators: stages from commanded to applied force.
+        sensors: stages from motion to signal.
+        force_sensors: stages on the measured force.
+        force_measured: the recorded input is the force that acted, as force sensors saw it, not the commanded one.
+        acquisition: stages on the sampled outputs.
+    """
+
+    inputs: tuple[str, ...] | None = None
+    outputs: tuple[str, ...] | None = None
+    swaps: tuple[tuple[str, str], ...] = ()
+    actuators: tuple[Stage, ...] = ()
+    sensors: tuple[Stage, ...] = ()
+    force_sensors: tuple[Stage, ...] = ()
+    force_measured: bool = False
+    acquisition: tuple[Stage, ...] = ()
+
+    def adding(self, place: str, *stages: Stage) -> Chain:
+        """The chain with stages appended in one place: actuators, sensors, force_sensors or acquisition."""
+        changed: dict[str, Any] = {place: (*getattr(self, place), *stages)}
+        return dataclasses.replace(self, **changed)
+
+    def check(self, inputs: Sequence[str], outputs: Sequence[str]) -> None:
+        """Check every channel name against those that exist.
+
+        Raises:
+            UnknownNameError: a name does not exist.
+        """
+        wanted = [("input", name, inputs) for name in self.inputs or ()]
+        wanted += [("output", name, outputs) for name in (self.outputs or ())]
+        wanted += [("output", name, outputs) for pair in self.swaps for name in pair]
+        for place, side, names in zip(
+            PLACES, ("input", "output", "input", "output"), (inputs, outputs) * 2, strict=True
+        ):
+            wanted += [(side, stage.channel, names) for stage in getattr(self, place) if stage.channel != ALL]
+        for place in ("force_sensors", "acquisition"):
+            for stage in getattr(self, place):
+                if stage.needs_substeps:
+                    raise RigError(
+                        f"stage {stage.name!r} cannot act on samples in {place!r}; put it among the sensors"
+                    )
+        for side, name, names in wanted:
+            if name not in names:
+                raise UnknownNameError(
+                    f"{side} channel {name!r} does not exist in the model; there are {', '.join(names) or 'none'}"
+                )
+
+    def for_channel(self, place: str, channel: str) -> tuple[Stage, ...]:
+        """The stages that one channel passes in one place."""
+        return tuple(s for s in getattr(self, place) if s.channel in (channel, ALL))
+
+    @property
+    def needs_substeps(self) -> bool:
+        """Whether a stage must see what happens between samples."""
+        return any(s.needs_substeps for s in (*self.actuators, *self.sensors))
+
+    def to_data(self) -> dict[str, Any]:
+        """Plain data for JSON."""
+        data: dict[str, Any] = {"inputs": self.inputs, "outputs": self.outputs, "swaps": self.swaps}
+        data["force_measured"] = self.force_measured or None
+        for place in PLACES:
+            data[place] = [{"stage": s.name, **dataclasses.asdict(s)} for s in getattr(self, place)]
+        return {key: value for key, value in data.items() if value not in (None, [], ())}
+
+    @classmethod
+    def from_data(cls, data: Mapping[str, Any]) -> Chain:
+        """The chain of `to_data`.
+
+        Raises:
+            RigError: a key or stage is unknown.
+        """
+        allowed = [f.name for f in fields(cls)]
+        for key in data:
+            if key not in allowed:
+                raise RigError(
+                    f"the measurement chain has an unknown key {key!r}; expected {', '.join(allowed)}"
+                )
+        values: dict[str, Any] = {
+            key: tuple(data[key]) for key in ("inputs", "outputs") if data.get(key) is not None
+        }
+        values["force_measured"] = bool(data.get("force_measured", False))
+        values["swaps"] = tuple((a, b) for a, b in data.get("swaps", ()))
+        for place in PLACES:
+            values[place] = tuple(_stage(item) for item in data.get(place, ()))
+        return cls(**values)
+
+    def __repr__(self) -> str:
+        parts = [f"{len(getattr(self, place))} {place}" for place in PLACES if getattr(self, place)]
+        return f"Chain({', '.join(parts) or 'ideal'})"
+
+
+def _stage(item: Mapping[str, Any]) -> Stage:
+    settings = dict(item)
+    kind = settings.pop("stage", None)
+    if kind not in STAGES:
+        raise RigError(f"stage {kind!r} is unknown; expected one of {', '.join(STAGES)}")
+    try:
+        return STAGES[kind](**settings)
+    except TypeError:
+        raise RigError(
+            f"stage {kind!r} was given {json.dumps(settings)}; expected {', '.join(f.name for f in fields(STAGES[kind]))}"
+        ) from None
+
+
+class _Recursion:
+    """z(k+1) = exp(p h) z(k) + w(k) for one pole, over consecutive blocks; gives z(k), from z(0) = 0."""
+
+    def __init__(self, growth: complex) -> None:
+        self.growth, self.memory = growth, np.zeros(1, dtype=complex)
+
+    def __call__(self, w: Array) -> Array:
+        z, self.memory = scipy.signal.lfilter([0.0, 1.0], [1.0, -self.growth], w, zi=self.memory)
+        return np.asarray(z)
+
+
+def _low_pass(corner_hz: float, order: int, dt: float) -> Process:
+    """Analog Butterworth low-pass of a sensor's signal, exact for straight lines between substeps.
+
+    The signal is at the end of the substep before and at the start of the one after each instant, since it may jump.
+    """
+    poles, residues = _butterworth(corner_hz, order)
+    one, two = _phi(poles * dt)
+    recursions = [_Recursion(growth) for growth in np.exp(poles * dt)]
+    last, rest = 0.0, np.nan
+
+    def process(x: Array) -> Array:
+        nonlocal last, rest
+        if np.isnan(rest):
+            # The filter has settled on what it saw before the record.
+            rest = float(x[0, 0])
+        before, after = x[:2] - rest
+        # The line that ends at an instant starts just after the instant before it.
+        start, last = np.concatenate([[last], after[:-1]]), float(after[-1])
+        y = np.full(before.size, rest)
+        for i, recursion in enumerate(recursions):
+            w = dt * ((one[i] - two[i]) * start + two[i] * before)
+            # The line ends at this instant, so this instant's state holds it already.
+            z = recursion(w)
+            y += (residues[i] * (recursion.growth * z + w)).real
+        return np.stack([y, y, y])
+
+    return process
+
+
+def _held_low_pass(corner_hz: float, order: int, dt: float) -> Process:
+    """Analog Butterworth low-pass of a force that is held over each substep at its mean: exact for a held force."""
+    poles, residues = _butterworth(corner_hz, order)
+    one, two = _phi(poles * dt)
+    recursions = [_Recursion(growth) for growth in np.exp(poles * dt)]
+
+    def process(x: Array) -> Array:
+        y, u = np.zeros_like(x), x[1]
+        for i, recursion in enumerate(recursions):
+            w = dt * one[i] * u
+            z = recursion(w)
+            for row, value in enumerate((z, one[i] * z + dt * two[i] * u, recursion.growth * z + w)):
+                y[row] += (residues[i] * value).real
+        return y
+
+    return process
+
+
+def _butterworth(corner_hz: float, order: int) -> tuple[np.ndarray, np.ndarray]:
+    """Poles [rad/s] in the upper half plane and residues of the analog filter, doubled where the conjugate is left out."""
+    _, poles, gain = scipy.signal.butter(order, 2 * np.pi * corner_hz, analog=True, output="zpk")
+    apart = poles[:, None] - poles[None, :] + np.eye(order)
+    residues = gain / np.prod(apart, axis=1)
+    # A real pole comes with a rounded imaginary part, or none.
+    real = np.abs(poles.imag) < 1e-9 * np.abs(poles)
+    kept = real | (poles.imag > 0)
+    return poles[kept], (residues * np.where(real, 1, 2))[kept]
+
+
+def _phi(x: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """(eˣ - 1) / x and (eˣ - 1 - x) / x², by their series where the difference would cancel."""
+    terms = [x**k / math.factorial(k + 2) for k in range(20)]
+    two = np.where(np.abs(x) < 0.5, sum(terms), (np.exp(x) - 1 - x) / x**2)
+    return 1 + x * two, two
+
+
+def _delay_line(delay: float, dt: float) -> tuple[int, float]:
+    """Whole steps of a delay and the remaining part of one."""
+    whole = int(np.floor(delay / dt + 1e-9))
+    part = delay / dt - whole
+    return whole, part if part > 1e-9 else 0.0

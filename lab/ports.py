@@ -1,0 +1,202 @@
+"""Ports: the channels that a compiled model offers, with their units and the degree of freedom each one belongs to."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import mujoco
+import numpy as np
+
+from identification.recording import Array, Channel
+from lab.errors import RigError, UnknownNameError
+
+S = mujoco.mjtSensor
+UNITS = {
+    S.mjSENS_ACCELEROMETER: "m/s^2",
+    S.mjSENS_VELOCIMETER: "m/s",
+    S.mjSENS_GYRO: "rad/s",
+    S.mjSENS_FORCE: "N",
+    S.mjSENS_TORQUE: "N m",
+    S.mjSENS_TENDONPOS: "m",
+    S.mjSENS_TENDONVEL: "m/s",
+    S.mjSENS_ACTUATORFRC: "N",
+    S.mjSENS_TENDONACTFRC: "N",
+    S.mjSENS_FRAMEPOS: "m",
+    S.mjSENS_FRAMELINVEL: "m/s",
+    S.mjSENS_FRAMEANGVEL: "rad/s",
+    S.mjSENS_FRAMELINACC: "m/s^2",
+    S.mjSENS_FRAMEANGACC: "rad/s^2",
+    S.mjSENS_SUBTREECOM: "m",
+    S.mjSENS_SUBTREELINVEL: "m/s",
+}
+"""Sensors that are output channels; joint sensors follow the kind of their joint."""
+JOINT_UNITS = {
+    S.mjSENS_JOINTPOS: ("m", "rad"),
+    S.mjSENS_JOINTVEL: ("m/s", "rad/s"),
+    S.mjSENS_JOINTACTFRC: ("N", "N m"),
+}
+DERIVATIVE = {"m": 0, "rad": 0, "m/s": 1, "rad/s": 1, "m/s^2": 2, "rad/s^2": 2}
+
+
+@dataclass(frozen=True, eq=False)
+class Ports:
+    """Every channel of a model.
+
+    Attributes:
+        inputs: one channel per actuator.
+        outputs: one channel per scalar reading.
+        rows: position of each output in `sensordata`.
+    """
+
+    inputs: tuple[Channel, ...]
+    outputs: tuple[Channel, ...]
+    rows: list[int]
+
+    def pick_inputs(self, names: Sequence[str] | None) -> tuple[list[int], tuple[Channel, ...]]:
+        """Positions and channels of the named inputs (all when None)."""
+        return _pick(self.inputs, names, "input")
+
+    def pick_outputs(self, names: Sequence[str] | None) -> tuple[list[int], tuple[Channel, ...]]:
+        """Positions and channels of the named outputs (all when None)."""
+        return _pick(self.outputs, names, "output")
+
+
+def find(model: mujoco.MjModel, position: Array, *, exact: bool) -> Ports:
+    """The channels of a model about the joint positions given; `exact` where its geometry is linear.
+
+    Raises:
+        RigError: two channels share a name.
+    """
+    names = [name_of(model, "joint", i) for i in range(model.njnt)]
+    inputs = [_input(model, i, column, names) for i, column in enumerate(_force_columns(model, position).T)]
+    jacobians = _sensor_jacobians(model, position, step=1.0 if exact else 1e-5)
+    outputs, rows = [], []
+    for i in range(model.nsensor):
+        unit = _unit(model, i)
+        if unit is None:
+            continue
+        base, width, address = name_of(model, "sensor", i), model.sensor_dim[i], model.sensor_adr[i]
+        for axis in range(width):
+            name = f"{base}.{'xyz'[axis]}" if width == 3 else base
+            row = address + axis
+            dof, factor = (
+                _single(jacobians[DERIVATIVE[unit]][row], names) if unit in DERIVATIVE else ("", 1.0)
+            )
+            outputs.append(Channel(name, unit, dof, factor))
+            rows.append(int(row))
+    for side, channels in (("actuators", inputs), ("sensors", outputs)):
+        listed = [c.name for c in channels]
+        if len(set(listed)) < len(listed):
+            double = next(n for n in listed if listed.count(n) > 1)
+            raise RigError(f"two {side} are called {double!r}; expected unique names")
+    return Ports(tuple(inputs), tuple(outputs), rows)
+
+
+def name_of(model: mujoco.MjModel, kind: str, index: int) -> str:
+    """Name of a model element, or its kind and number when it has none."""
+    return getattr(model, kind)(index).name or f"{kind}{index}"
+
+
+def _pick(
+    channels: tuple[Channel, ...], names: Sequence[str] | None, side: str
+) -> tuple[list[int], tuple[Channel, ...]]:
+    if names is None:
+        return list(range(len(channels))), channels
+    position = {c.name: i for i, c in enumerate(channels)}
+    for name in names:
+        if name not in position:
+            raise UnknownNameError(
+                f"{side} channel {name!r} does not exist in the model; there are {', '.join(position) or 'none'}"
+            )
+    chosen = [position[name] for name in names]
+    return chosen, tuple(channels[i] for i in chosen)
+
+
+def _unit(model: mujoco.MjModel, sensor: int) -> str | None:
+    kind = S(model.sensor_type[sensor])
+    if kind in JOINT_UNITS:
+        hinge = model.jnt_type[model.sensor_objid[sensor]] == int(mujoco.mjtJoint.mjJNT_HINGE)
+        return JOINT_UNITS[kind][int(hinge)]
+    return UNITS.get(kind)
+
+
+def _input(model: mujoco.MjModel, actuator: int, column: Array, names: list[str]) -> Channel:
+    dof, factor = _single(column, names)
+    hinge = model.actuator_trntype[actuator] == int(mujoco.mjtTrn.mjTRN_JOINT) and (
+        model.jnt_type[model.actuator_trnid[actuator, 0]] == int(mujoco.mjtJoint.mjJNT_HINGE)
+    )
+    # A servo turns its control into a force proportional to position or velocity: the control has that unit.
+    bias = model.actuator_biasprm[actuator]
+    if bias[1]:
+        unit = "rad" if hinge else "m"
+    elif bias[2]:
+        unit = "rad/s" if hinge else "m/s"
+    else:
+        unit = "N m" if hinge else "N"
+    return Channel(name_of(model, "actuator", actuator), unit, dof, factor)
+
+
+def _single(row: Array, names: list[str]) -> tuple[str, float]:
+    """The one degree of freedom that a row of coefficients touches, and its coefficient."""
+    largest = np.max(np.abs(row), initial=0.0)
+    touched = np.flatnonzero(np.abs(row) > 1e-9 * largest)
+    if largest < 1e-12 or touched.size != 1:
+        return "", 1.0
+    value = float(row[touched[0]])
+    # Direction cosines come out of rotations: -1 and 1 are meant where they are met to rounding.
+    return names[touched[0]], float(np.round(value)) if abs(abs(value) - 1) < 1e-9 else value
+
+
+def _force_columns(model: mujoco.MjModel, position: Array) -> Array:
+    """Generalized force per unit of control (of activation, for a filtered actuator), shape (n_dofs, n_controls)."""
+    data = mujoco.MjData(model)
+    data.qpos[:] = position
+    mujoco.mj_fwdPosition(model, data)
+    moment = np.zeros((model.nu, model.nv))
+    mujoco.mju_sparse2dense(
+        moment, data.actuator_moment, data.moment_rownnz, data.moment_rowadr, data.moment_colind
+    )
+    gains = np.array([_gain(model, i, data) for i in range(model.nu)])
+    return (moment * gains[:, None]).T if model.nu else np.zeros((model.nv, 0))
+
+
+def _gain(model: mujoco.MjModel, actuator: int, data: mujoco.MjData) -> float:
+    gain = model.actuator_gainprm[actuator]
+    if model.actuator_gaintype[actuator] == int(mujoco.mjtGain.mjGAIN_FIXED):
+        return float(gain[0])
+    if model.actuator_gaintype[actuator] == int(mujoco.mjtGain.mjGAIN_AFFINE):
+        return float(gain[0] + gain[1] * data.actuator_length[actuator])
+    raise RigError(
+        f"actuator {name_of(model, 'actuator', actuator)!r} is a muscle or has its own gain law; expected a motor, "
+        "position, velocity or general actuator with fixed or affine gain"
+    )
+
+
+def _sensor_jacobians(model: mujoco.MjModel, position: Array, *, step: float) -> tuple[Array, Array, Array]:
+    """Readings per unit of position, velocity and acceleration of each joint, each (n_sensordata, n_dofs)."""
+    data = mujoco.MjData(model)
+    n = model.nv
+
+    def readings(q: Array, v: Array, a: Array) -> Array:
+        data.qpos[:], data.qvel[:] = position + q, v
+        mujoco.mj_fwdPosition(model, data)
+        mujoco.mj_sensorPos(model, data)
+        mujoco.mj_fwdVelocity(model, data)
+        mujoco.mj_sensorVel(model, data)
+        data.qacc[:] = a
+        mujoco.mj_rnePostConstraint(model, data)
+        mujoco.mj_sensorAcc(model, data)
+        return data.sensordata.copy()
+
+    zero = np.zeros(n)
+    jacobians = []
+    for slot, size in ((0, step), (1, 1.0), (2, 1.0)):
+        J = np.zeros((model.nsensordata, n))
+        for j in range(n):
+            plus, minus = [zero, zero, zero], [zero, zero, zero]
+            plus[slot] = size * np.eye(n)[j]
+            minus[slot] = -plus[slot]
+            J[:, j] = (readings(*plus) - readings(*minus)) / (2 * size)
+        jacobians.append(J)
+    return tuple(jacobians)  # type: ignore[return-value]

@@ -1,0 +1,447 @@
+"""Simulate: a rig under a load gives a recording, through MuJoCo and the whole measurement chain."""
+
+from __future__ import annotations
+
+import tempfile
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+import numpy as np
+
+from identification.recording import DERIVATIVE, Array, Record, Recording
+from lab import stepping
+from lab.chain import Delay, Process
+from lab.errors import LabError
+from lab.excitation import BLOCK, Excitation, Load, Sampling
+from lab.files.recording import RecordingWriter, load
+from lab.rig import Rig
+from lab.stepping import Plan, Stepper
+
+PILOT_SAMPLES = 512
+"""Length of the trial runs on which the error is measured."""
+
+FINEST, FINEST_UNASKED = 4096, 256
+"""Most substeps per sample, for an accuracy that was asked for and for the default one."""
+
+IDEAL_ACCURACY = 1e-9
+NOISE_SHARE = 1e-3
+"""Default error: this share of the smallest noise in the chain, or `IDEAL_ACCURACY` when the chain adds none."""
+
+DRIVE, NOISE = 0, 1
+"""Separate streams of randomness: what drives the structure, and what disturbs the signals."""
+
+Progress = Callable[[int], None]
+
+
+@dataclass(frozen=True, eq=False)
+class Motion:
+    """Motion of every degree of freedom, for pictures.
+
+    Attributes:
+        time: shape (n_samples,) [s].
+        position: displacement from the operating point, shape (n_dofs, n_samples) [m or rad].
+        inputs: commanded inputs, shape (n_inputs, n_samples).
+    """
+
+    time: Array
+    position: Array
+    inputs: Array
+
+
+def simulate(
+    rig: Rig,
+    excitation: Excitation,
+    *,
+    sample_rate: float,
+    duration: float,
+    n_runs: int = 1,
+    seed: int = 0,
+    accuracy: float | None = None,
+    progress: Progress | None = None,
+) -> Recording:
+    """The recording that a test bench would deliver.
+
+    Args:
+        rig: structure and measurement chain; it starts at rest at its operating point, where instruments are zeroed.
+        excitation: how it is driven.
+        sample_rate: [Hz].
+        duration: of each record [s].
+        n_runs: how often the test is repeated, with fresh randomness.
+        seed: of everything random; the same seed gives the same recording to the last bit.
+        accuracy: largest error of the simulated response relative to the largest value of its channel; when None, a
+            thousandth of the smallest noise in the chain, or 1e-9 when it adds none, as far as 256 substeps go.
+        progress: called with the number of samples done since the last call.
+
+    Returns:
+        Recording with the attribute `simulation_error`, the measured relative error of the response.
+
+    Raises:
+        LabError: the accuracy cannot be reached, or the excitation does not fit the rig.
+        DivergedError: the motion is no longer finite.
+    """
+    bench = _Bench.prepare(rig, excitation, sample_rate, duration, n_runs, seed, accuracy)
+    records = []
+    for number, (load_, blocks) in enumerate(bench.responses(progress)):
+        parts = list(blocks)
+        inputs = np.concatenate([part[0] for part in parts], axis=1)
+        outputs = np.concatenate([part[1] for part in parts], axis=1)
+        digitize = bench.digitizer(number, _rms(inputs), _rms(outputs))
+        digitized = [digitize(a, b) for a, b in parts]
+        measured = [part[0] for part in digitized] if load_.measured else [np.zeros((0, load_.n_samples))]
+        outputs = np.concatenate([part[1] for part in digitized], axis=1)
+        records.append(Record(load_.kind, np.concatenate(measured, axis=1), outputs))
+    return Recording(
+        tuple(records), rig.inputs, rig.outputs, sample_rate, rig.name, "virtual modal lab", bench.attributes
+    )
+
+
+def simulate_to_file(
+    path: str | Path,
+    rig: Rig,
+    excitation: Excitation,
+    *,
+    sample_rate: float,
+    duration: float,
+    n_runs: int = 1,
+    seed: int = 0,
+    accuracy: float | None = None,
+    progress: Progress | None = None,
+) -> None:
+    """Writes the recording of `simulate` block by block, however long it is; the same values to the last bit."""
+    bench = _Bench.prepare(rig, excitation, sample_rate, duration, n_runs, seed, accuracy)
+    path = Path(path)
+    about = (rig.inputs, rig.outputs, sample_rate)
+    whole = RecordingWriter(
+        path, *about, title=rig.name, source="virtual modal lab", attributes=bench.attributes
+    )
+    with whole as final, tempfile.TemporaryDirectory(dir=path.parent) as folder:
+        for number, (load_, blocks) in enumerate(bench.responses(progress, one_by_one=True)):
+            # Noise relative to a record's RMS is known only at the record's end: keep the clean record until then.
+            clean = Path(folder) / "clean.h5"
+            sums, n = [np.zeros(len(rig.inputs)), np.zeros(len(rig.outputs))], load_.n_samples
+            with RecordingWriter(clean, *about) as writer:
+                writer.start(load_.kind)
+                for inputs, outputs in blocks:
+                    writer.append(inputs, outputs)
+                    sums = [s + np.sum(x**2, axis=1) for s, x in zip(sums, (inputs, outputs), strict=True)]
+            digitize = bench.digitizer(number, *(np.sqrt(s / n) for s in sums))
+            final.start(load_.kind)
+            for inputs, outputs in load(clean, lazy=True).records[0].blocks(BLOCK):
+                inputs, outputs = digitize(inputs, outputs)
+                final.append(inputs if load_.measured else np.zeros((0, outputs.shape[1])), outputs)
+
+
+def motion(
+    rig: Rig,
+    excitation: Excitation,
+    *,
+    sample_rate: float,
+    duration: float,
+    seed: int = 0,
+    progress: Progress | None = None,
+) -> Motion:
+    """Motion of the first record of the same test, accurate enough to look at."""
+    bench = _Bench.prepare(rig, excitation, sample_rate, duration, 1, seed, 1e-4)
+    first = bench.loads[0]
+    inputs, positions = [], []
+    for part in bench.batch([first], progress):
+        inputs.append(part.commands[0])
+        positions.append(part.positions[0])
+    return Motion(
+        np.arange(first.n_samples) / sample_rate,
+        np.concatenate(positions, axis=1),
+        np.concatenate(inputs, axis=1),
+    )
+
+
+@dataclass(frozen=True, eq=False)
+class _Part:
+    """A stretch of a batch of records, sampled: commands, applied forces, readings and positions."""
+
+    commands: Array  # (n_batch, n_inputs, m)
+    applied: Array  # (n_batch, n_inputs, m)
+    outputs: Array  # (n_batch, n_outputs, m)
+    positions: Array  # (n_batch, n_dofs, m)
+
+
+@dataclass(frozen=True, eq=False)
+class _Bench:
+    """One test, ready to run."""
+
+    rig: Rig
+    loads: tuple[Load, ...]
+    sample_rate: float
+    plan: Plan
+    accuracy: float
+    seed: int
+
+    @classmethod
+    def prepare(
+        cls,
+        rig: Rig,
+        excitation: Excitation,
+        sample_rate: float,
+        duration: float,
+        n_runs: int,
+        seed: int,
+        accuracy: float | None,
+    ) -> _Bench:
+        for name, value in (("sample_rate", sample_rate), ("duration", duration), ("n_runs", n_runs)):
+            if not (np.isfinite(value) and value > 0):
+                raise LabError(f"{name} is {value}; expected a positive number")
+        if accuracy is not None and not 1e-13 <= accuracy < 1:
+            raise LabError(f"accuracy is {accuracy}; expected a relative error from 1e-13 to below 1")
+        n_samples = round(duration * sample_rate)
+        if n_samples < 1 or not rig.outputs:
+            raise LabError(
+                f"the test has {n_samples} samples and {len(rig.outputs)} output channels; expected at least one of each"
+            )
+        rng = np.random.default_rng([seed, DRIVE])
+        sampling = Sampling(sample_rate, n_samples)
+        loads = tuple(load for _ in range(n_runs) for load in excitation.loads(rig, sampling, rng))
+        bench = cls(rig, loads, sample_rate, Plan(1, False), 0.0, seed)
+        return bench._planned(accuracy)
+
+    @property
+    def attributes(self) -> dict[str, str | float]:
+        """Facts about the simulation that travel with the recording."""
+        return {
+            "simulation_error": self.plan.error,
+            "simulation_accuracy": self.accuracy,
+            "simulation_substeps": float(self.plan.substeps),
+        }
+
+    def _planned(self, asked: float | None) -> _Bench:
+        """The bench with substeps that reach the accuracy, as measured on the start of its first records."""
+        dt, chain = 1 / self.sample_rate, self.rig.chain
+        pilots = [replace(load, n_samples=min(load.n_samples, PILOT_SAMPLES)) for load in self.loads[:4]]
+        delays = [s.delay for s in (*chain.actuators, *chain.sensors) if isinstance(s, Delay)]
+
+        def guess(accuracy: float) -> Plan:
+            return stepping.aligned(stepping.first_guess(self.rig, dt, accuracy), dt, delays)
+
+        accuracy = IDEAL_ACCURACY if asked is None else asked
+        if asked is None and chain.acquisition:
+            outputs = [part.outputs for part in self._with(guess(1e-4)).batch(pilots, None)]
+            accuracy = self._default_accuracy(np.concatenate(outputs, axis=2))
+        plan, finest = guess(accuracy), FINEST if asked is not None else FINEST_UNASKED
+        while True:
+            plan = replace(plan, error=self._error(plan, pilots))
+            if plan.error <= accuracy:
+                break
+            if plan.substeps >= finest and asked is None:
+                # Kinks in forces and lags of instruments cap the order: keep the best, its error is on record.
+                break
+            if plan.substeps >= finest:
+                raise LabError(
+                    f"an accuracy of {accuracy:.1e} is out of reach: the error is {plan.error:.1e} with {plan.substeps} "
+                    "substeps per sample; ask for less, or sample faster"
+                )
+            wanted = stepping.finer(self.rig, plan, accuracy)
+            plan = stepping.aligned(replace(wanted, substeps=min(wanted.substeps, finest)), dt, delays)
+        return replace(self._with(plan), accuracy=accuracy)
+
+    def _with(self, plan: Plan) -> _Bench:
+        return replace(self, plan=plan)
+
+    def _error(self, plan: Plan, pilots: Sequence[Load]) -> float:
+        """Largest difference to twice the substeps, relative to the largest value of its channel."""
+        coarse, fine = (
+            np.concatenate([part.outputs for part in self._with(p).batch(pilots, None)], axis=2)
+            for p in (plan, stepping.doubled(plan))
+        )
+        difference = np.max(np.abs(coarse - fine), axis=2)  # (n_batch, n_outputs)
+        largest = np.max(np.abs(fine), axis=2)
+        # A channel across all motion reads rounding only; it has no scale of its own.
+        for unit in {channel.unit for channel in self.rig.outputs}:
+            same = [channel.unit == unit for channel in self.rig.outputs]
+            largest[:, same] = np.maximum(largest[:, same], 1e-6 * np.max(largest[:, same]))
+        return float(np.max(difference / np.where(largest > 0, largest, 1.0)))
+
+    def _default_accuracy(self, outputs: Array) -> float:
+        largest, rms = np.max(np.abs(outputs), axis=(0, 2)), _rms(np.concatenate(list(outputs), axis=1))
+        smallest = float("inf")
+        for row, channel in enumerate(self.rig.outputs):
+            for stage in self.rig.chain.for_channel("acquisition", channel.name):
+                if largest[row] > 0:
+                    noise = min(stage.relative_noise * rms[row], stage.absolute_noise)
+                    smallest = min(smallest, noise / largest[row])
+        if not np.isfinite(smallest):
+            return IDEAL_ACCURACY
+        return float(np.clip(NOISE_SHARE * smallest, 1e-12, 1e-4))
+
+    def responses(
+        self, progress: Progress | None, *, one_by_one: bool = False
+    ) -> Iterator[tuple[Load, Iterator[tuple[Array, Array]]]]:
+        """Each load with its clean samples, block by block: measured inputs and outputs."""
+        if one_by_one:
+            for load_ in self.loads:
+                yield load_, ((part.applied[0], part.outputs[0]) for part in self.batch([load_], progress))
+            return
+        parts = list(self.batch(self.loads, progress))
+        for number, load_ in enumerate(self.loads):
+            yield load_, ((part.applied[number], part.outputs[number]) for part in parts)
+
+    def batch(self, loads: Sequence[Load], progress: Progress | None) -> Iterator[_Part]:
+        """Records of equal length side by side, in stretches of at most `BLOCK` samples."""
+        start = (np.stack([load.position for load in loads]), np.stack([load.velocity for load in loads]))
+        dt = 1 / self.sample_rate
+        runs = [_Run(self.rig, Stepper(self.rig, dt, substeps, *start), dt) for substeps in self.plan.runs]
+        sensors = None if self.rig.chain.needs_substeps else [_sensors(self.rig, dt) for _ in loads]
+        blocks = [load.blocks() for load in loads]
+        done = 0
+        while done < loads[0].n_samples:
+            items = [next(block) for block in blocks]
+            n = min(items[0][0].shape[1], loads[0].n_samples - done)
+            commands = np.stack([item[0][:, :n] for item in items])
+            forces = None if items[0][1] is None else np.stack([item[1][:, :n] for item in items])  # type: ignore[index]
+            parts = [run.respond(commands, forces) for run in runs]
+            part = replace(
+                parts[0],
+                outputs=self.plan.combined([part.outputs for part in parts]),
+                positions=self.plan.combined([part.positions for part in parts]),
+            )
+            if sensors is not None:
+                # Without memory between samples, sensors need not see the substeps.
+                pairs = zip(sensors, part.outputs, strict=True)
+                sensed = [_through(rows, np.stack([y, y, y], axis=1))[:, 2] for rows, y in pairs]
+                part = replace(part, outputs=np.stack(sensed))
+            yield part
+            done += n
+            if progress is not None:
+                progress(n * len(loads))
+
+    def digitizer(
+        self, number: int, rms_inputs: Array, rms_outputs: Array
+    ) -> Callable[[Array, Array], tuple[Array, Array]]:
+        """What force sensors and acquisition make of the samples of record `number`, block by block."""
+        dt, chain = 1 / self.sample_rate, self.rig.chain
+        order = _swapped(self.rig)
+        rms_outputs = rms_outputs[order]
+        sides = (
+            ("force_sensors", self.rig.inputs, rms_inputs),
+            ("acquisition", self.rig.outputs, rms_outputs),
+        )
+        processes = []
+        for side, (place, channels, rms) in enumerate(sides):
+            rows = []
+            for row, (channel, size) in enumerate(zip(channels, rms, strict=True)):
+                stages = chain.for_channel(place, channel.name)
+                rngs = [
+                    np.random.default_rng([self.seed, NOISE, number, side, row, i])
+                    for i in range(len(stages))
+                ]
+                rows.append([s.start(dt, rng, float(size)) for s, rng in zip(stages, rngs, strict=True)])
+            processes.append(rows)
+
+        def digitize(inputs: Array, outputs: Array) -> tuple[Array, Array]:
+            return _through(processes[0], inputs), _through(processes[1], outputs[order])
+
+        return digitize
+
+
+class _Run:
+    """A stepper with the actuators before it and, where they must see substeps, the sensors behind it."""
+
+    def __init__(self, rig: Rig, stepper: Stepper, dt: float) -> None:
+        self.rig, self.stepper = rig, stepper
+        h = dt / stepper.substeps
+        chain, batch = rig.chain, range(stepper.n_batch)
+        self.controls = [rig.control_of(channel.name) for channel in rig.inputs]
+        self.rows = [rig.row_of(channel.name) for channel in rig.outputs]
+        self.actuators = [
+            [[s.start_held(h) for s in chain.for_channel("actuators", c.name)] for c in rig.inputs]
+            for _ in batch
+        ]
+        self.sensors = [_sensors(rig, h) for _ in batch] if chain.needs_substeps else None
+        self.last_forces: Array | None = None
+
+    def respond(self, commands: Array, forces: Array | None) -> _Part:
+        """The batch's response to commands (n_batch, n_inputs, m) and forces (n_batch, n_dofs, m), sampled."""
+        size, parts = self.stepper.samples_per_chunk, []
+        for a in range(0, commands.shape[2], size):
+            parts.append(
+                self._chunk(
+                    commands[..., a : a + size], None if forces is None else forces[..., a : a + size]
+                )
+            )
+        fields = ("applied", "outputs", "positions")
+        joined = {name: np.concatenate([getattr(part, name) for part in parts], axis=2) for name in fields}
+        return _Part(commands, **joined)
+
+    def _chunk(self, commands: Array, forces: Array | None) -> _Part:
+        sub = self.stepper.substeps
+        held = np.repeat(
+            np.repeat(commands, sub, axis=2)[:, :, None], 3, axis=2
+        )  # (n_batch, n_inputs, 3, n_substeps)
+        acting = np.stack([_through(rows, x) for rows, x in zip(self.actuators, held, strict=True)])
+        controls = np.zeros((acting.shape[0], self.rig.model.nu, *acting.shape[2:]))
+        controls[:, self.controls] = acting
+        applied = acting[:, :, 1]
+        pushes = None if forces is None else np.repeat(forces, sub, axis=2)
+        sensordata, positions = self.stepper.advance(controls[:, :, 1], pushes)
+        readings = sensordata[:, self.rows]
+        if self.sensors is not None:
+            pairs = self._both_sides(readings, controls, pushes)
+            readings = np.stack(
+                [_through(rows, y)[:, 1] for rows, y in zip(self.sensors, pairs, strict=True)]
+            )
+        measured = commands
+        if self.rig.chain.force_measured:
+            measured = applied.reshape(*commands.shape, sub).mean(axis=3)
+        return _Part(commands, measured, readings[..., ::sub], positions[..., ::sub])
+
+    def _both_sides(self, readings: Array, controls: Array, pushes: Array | None) -> Array:
+        """Readings on both sides of each instant and at it, shape (n_batch, n_outputs, 3, n_substeps).
+
+        MuJoCo reads with the mean force of the substep that starts; another force changes the acceleration through the
+        feedthrough.
+        """
+        forces = controls
+        if pushes is not None:
+            forces = np.concatenate([controls, np.repeat(pushes[:, :, None], 3, axis=2)], axis=1)
+        start, mean = forces[:, :, 0], forces[:, :, 1]
+        first = self.last_forces is None
+        last = np.zeros((*mean.shape[:2], 1)) if self.last_forces is None else self.last_forces
+        previous = np.concatenate([last, mean[..., :-1]], axis=2)
+        self.last_forces = mean[..., -1:]
+        D = self.rig.feedthrough[self.rows][:, : forces.shape[1]]
+        before, now = readings + D @ (previous - mean), readings + D @ (start - mean)
+        if first:
+            # Before a release the structure was held still where it starts.
+            before[:, [DERIVATIVE.get(c.quantity, 2) == 2 for c in self.rig.outputs], 0] = 0.0
+        return np.stack([before, readings, now], axis=2)
+
+
+def _sensors(rig: Rig, dt: float) -> list[list[Process]]:
+    """Fresh sensor stages for every output of one record."""
+    rng = np.random.default_rng(0)
+    return [[s.start(dt, rng, 0.0) for s in rig.chain.for_channel("sensors", c.name)] for c in rig.outputs]
+
+
+def _through(processes: Sequence[Sequence[Process]], signals: Array) -> Array:
+    """Every row through its own processes."""
+    if not any(processes):
+        return signals
+    rows = []
+    for row, chain in zip(signals, processes, strict=True):
+        for process in chain:
+            row = process(row)
+        rows.append(row)
+    return np.stack(rows) if rows else signals
+
+
+def _swapped(rig: Rig) -> list[int]:
+    """Which output each recorded channel really carries."""
+    names = [channel.name for channel in rig.outputs]
+    order = list(range(len(names)))
+    for a, b in rig.chain.swaps:
+        if a in names and b in names:
+            i, j = names.index(a), names.index(b)
+            order[i], order[j] = order[j], order[i]
+    return order
+
+
+def _rms(signals: Array) -> Array:
+    return np.sqrt(np.mean(signals**2, axis=1))
