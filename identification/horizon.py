@@ -17,32 +17,32 @@ MAX_SEGMENT = 1 << 14
 MAX_SAMPLES = 1 << 17
 
 
-def lowest_peak(recording: Recording) -> float | None:
-    """Frequency of the lowest resonance peak in the spectra of the outputs [Hz]; None when none stands out.
+def resonance_peaks(recording: Recording) -> list[float]:
+    """Frequencies of the resonance peaks in the spectra of the outputs [Hz], rising.
 
     The power spectra of all outputs, each divided by its total power, are added. A peak stands out when the
-    sum falls to a quarter of it on both sides before rising above it again, as a resonance with less than
-    25 % damping does and the scatter of averaged spectra hardly ever, and when it reaches a thousandth of
-    the highest.
+    sum rises to it by a factor of four and falls from it by as much, as at a resonance with less than 25 %
+    damping and hardly ever by the scatter of averaged spectra, and when it reaches a thousandth of the
+    highest.
 
     Args:
         recording: the outputs of the first `MAX_SAMPLES` samples of each record are looked at.
 
     Returns:
-        The frequency of the top bin. Fewer than about 16 periods in a record cannot be told from drift.
+        The top bin of each peak. Fewer than about 16 periods in a record cannot be told from drift.
 
     Source: Welch (1967), IEEE Trans. Audio Electroacoust. 15, for the averaged spectra.
     """
     longest = min(max(record.n_samples for record in recording.records), MAX_SAMPLES)
     length = min(1 << (longest // 8).bit_length() - 1, MAX_SEGMENT)
-    if length < 32 or length > longest:
-        return None
-    power = _relative_power(recording, length)
-    tops = (power[1:-1] >= power[:-2]) & (power[1:-1] >= power[2:]) & (power[1:-1] >= 1e-3 * np.max(power))
-    for k in (np.flatnonzero(tops) + 1).tolist():
-        if k >= 2 and _stands_out(power, k):
-            return float(k * recording.sample_rate / length)
-    return None
+    if length < 32:
+        return []
+    with np.errstate(
+        invalid="ignore", over="ignore"
+    ):  # whoever needs the samples names those that are missing
+        power = _relative_power(recording, length)
+    found = [k for k in _peaks(power, 4.0) if k >= 2 and power[k] >= 1e-3 * np.max(power)]
+    return [k * recording.sample_rate / length for k in found]
 
 
 def _relative_power(recording: Recording, length: int) -> Array:
@@ -61,10 +61,18 @@ def _relative_power(recording: Recording, length: int) -> Array:
     return np.asarray(np.sum(power / np.where(total == 0, 1, total), axis=0))
 
 
-def _stands_out(power: Array, k: int) -> bool:
-    """Whether the spectrum falls from bin k to a quarter on both sides before it rises above it again."""
-    valleys = []
-    for side in (power[k - 1 :: -1], power[k + 1 :]):
-        higher = np.flatnonzero(side > power[k])
-        valleys.append(np.min(side[: higher[0]] if higher.size else side))
-    return bool(power[k] >= 4 * max(valleys))
+def _peaks(power: Array, factor: float) -> list[int]:
+    """Bins of the peaks that the spectrum climbs to, and falls from, by more than a factor."""
+    found, top, bottom, climbing = [], 0, np.inf, False
+    for k, value in enumerate(power.tolist()):
+        if climbing:
+            if value > power[top]:
+                top = k
+            elif value * factor < power[top]:
+                found.append(top)
+                bottom, climbing = value, False
+        elif value > factor * bottom:
+            top, climbing = k, True
+        else:
+            bottom = min(bottom, value)
+    return found

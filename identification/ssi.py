@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 from identification.covariance import output_covariances, reference_rows
 from identification.errors import IdentificationError, OrderError
 from identification.hankel import shift_invariance
-from identification.horizon import lowest_peak
+from identification.horizon import resonance_peaks
 from identification.modes import Modes
 from identification.recording import Array, Recording
 from identification.systems import Realization, StateSpace
@@ -41,8 +41,8 @@ def ssi_cov(
         recording: outputs of a structure under random excitation, measured or not; inputs are not used.
         order: number of states of the model to choose; the largest gap of the singular values decides when
             None.
-        orders: orders to realize besides `order`; when both are None, 2, 4, … up to 100 or what the data
-            carry.
+        orders: orders to realize besides `order`; when both are None, 2, 4, … up to six for each resonance
+            peak in the spectra.
         n_rows: block rows of the Hankel matrix, so that lags 1 to 2 `n_rows` - 1 are used; one period of
             the lowest resonance peak when None.
         references: names of the reference outputs, of which each covariance takes one; all outputs when None.
@@ -59,10 +59,15 @@ def ssi_cov(
         CONEM, eqs. (24) to (37), with the block columns of eq. (29) in reverse order.
     """
     n_outputs, n_references = len(recording.outputs), reference_rows(recording, references).size
-    wanted = _wanted_orders(recording, order, orders)
-    notes = []
+    notes: list[str] = []
+    sweep = order is None and orders is None
+    peaks = resonance_peaks(recording) if sweep or n_rows is None else []
+    if sweep:
+        orders, reason = _choose_orders(recording, len(peaks))
+        notes.append(reason)
+    wanted = _sorted_orders(order, orders)
     if n_rows is None:
-        n_rows, reason = _choose_rows(recording, wanted[-1], n_references)
+        n_rows, reason = _choose_rows(recording, peaks, wanted[-1], n_references)
         notes.append(reason)
     elif n_rows < 2:
         raise IdentificationError(f"{n_rows} block rows were asked for; expected at least 2")
@@ -115,7 +120,7 @@ def leading_subspace(H: Array, n: int) -> tuple[Array, Array]:
     n = min(n, small)
     wide = H.shape[0] <= H.shape[1]
     G = H @ H.T if wide else H.T @ H
-    subset = (small - n, small - 1) if 3 * n < small else None
+    subset = (small - n, small - 1) if 6 * n < small else None  # otherwise all cost less
     w, V = scipy.linalg.eigh(G, subset_by_index=subset, overwrite_a=True, check_finite=False)
     w, V = w[::-1][:n], V[:, ::-1][:, :n]
     if w[-1] <= 1e3 * small * np.finfo(float).eps * w[0]:
@@ -130,28 +135,37 @@ def _outputs_only(A: Array, C: Array, recording: Recording) -> StateSpace:
     return StateSpace(A, np.zeros((n, 0)), C, np.zeros((len(C), 0)), recording.dt, (), recording.outputs)
 
 
-def _wanted_orders(recording: Recording, order: int | None, orders: Iterable[int] | None) -> list[int]:
-    """Orders to realize, rising; a default sweep leaves at least ten samples for each state."""
-    if order is None and orders is None:
-        return list(range(2, max(min(MAX_ORDER, recording.n_samples // 10), 2) + 1, 2))
-    wanted = sorted({*([] if orders is None else orders), *([] if order is None else [order])})
+def _choose_orders(recording: Recording, n_peaks: int) -> tuple[range, str]:
+    """Orders to sweep, three times as many modes as there are resonance peaks, and the reason."""
+    highest = min(max(6 * n_peaks, 20), MAX_ORDER)
+    affordable = max(recording.n_samples // 20 * 2, 2)
+    if affordable < highest:
+        return range(2, affordable + 1, 2), f"Orders go up to {affordable}, one state per ten samples."
+    return range(2, highest + 1, 2), (
+        f"Orders go up to {highest}, as the spectra show {n_peaks} resonance peaks "
+        f"and three times as many modes are allowed for (at least 10, at most {MAX_ORDER // 2})."
+    )
+
+
+def _sorted_orders(order: int | None, orders: Iterable[int] | None) -> list[int]:
+    wanted = sorted({*(orders or ()), *(() if order is None else (order,))})
     if not wanted or wanted[0] < 1:
         raise OrderError(f"orders are {wanted}; expected whole numbers from 1 on")
     return wanted
 
 
-def _choose_rows(recording: Recording, order: int, n_references: int) -> tuple[int, str]:
+def _choose_rows(
+    recording: Recording, peaks: Sequence[float], order: int, n_references: int
+) -> tuple[int, str]:
     """Block rows for the slowest oscillation, the highest order and the length of the record; the reason."""
     longest = max(record.n_samples for record in recording.records)
-    peak = lowest_peak(recording)
-    period = 0 if peak is None else math.ceil(recording.sample_rate / peak)
+    period = math.ceil(recording.sample_rate / peaks[0]) if peaks else 0
     for_order = 2 + -(-3 * order // (2 * n_references))
     limit = max(min(longest // 4, MAX_VALUES // (MAX_COLUMNS * len(recording.outputs))), 2)
     if limit < max(period, for_order):
-        why = "the most that the length of the record or the memory allows"
-        n_rows = limit
+        n_rows, why = limit, "the most that the length of the record or the memory allows"
     elif period >= for_order:
-        n_rows, why = period, f"one period of the lowest resonance peak, at {peak:.4g} Hz"
+        n_rows, why = period, f"one period of the lowest resonance peak, at {peaks[0]:.4g} Hz"
     else:
         n_rows, why = for_order, f"one and a half times as many as order {order} needs"
     return n_rows, f"The horizon is {n_rows} block rows, {why}."

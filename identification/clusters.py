@@ -1,0 +1,174 @@
+"""Poles of one mode, gathered over the orders, and the mean that stands for them."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from identification.modes import Complex
+from identification.recording import Array
+
+Indices = NDArray[np.intp]
+
+MIN_LENGTH = 3
+"""Fewest poles of a mode: two may agree by chance, and tell nothing about a scatter."""
+
+
+@dataclass(frozen=True)
+class Thresholds:
+    """When two poles count as the same, and when a pole counts as no oscillation at all.
+
+    Attributes:
+        frequency_tolerance: largest relative difference of frequency.
+        damping_tolerance: largest relative difference of damping.
+        damping_step: a smaller difference of the damping ratio passes too, since the relative scatter of
+            light damping is large in any record.
+        min_mac: smallest modal assurance criterion between the shapes.
+        max_damping: largest damping ratio of a mode.
+        min_collinearity: smallest modal phase collinearity; 0 lets complex modes pass.
+    """
+
+    frequency_tolerance: float = 0.01
+    damping_tolerance: float = 0.2
+    damping_step: float = 0.002
+    min_mac: float = 0.9
+    max_damping: float = 0.2
+    min_collinearity: float = 0.0
+
+
+class Poles(NamedTuple):
+    """Oscillating poles.
+
+    Attributes:
+        order: of the model each pole comes from, rising, shape (n_poles,).
+        frequency_hz: shape (n_poles,).
+        damping_ratio: shape (n_poles,).
+        shapes: of length one, shape (n_outputs, n_poles).
+    """
+
+    order: Indices
+    frequency_hz: Array
+    damping_ratio: Array
+    shapes: Complex
+
+    def take(self, which: Indices | slice) -> Poles:
+        """The poles at the given positions."""
+        return Poles(
+            self.order[which], self.frequency_hz[which], self.damping_ratio[which], self.shapes[:, which]
+        )
+
+
+class Difference(NamedTuple):
+    """How far the poles of one set are from those of another, each entry of shape (n_a, n_b).
+
+    Attributes:
+        frequency: over what is allowed; more than one is too far.
+        shape: 1 - MAC over what is allowed.
+        damping: over what is allowed.
+        distance: one number to find the nearest by: distance in the complex plane and of the shapes.
+    """
+
+    frequency: Array
+    shape: Array
+    damping: Array
+    distance: Array
+
+
+def difference(a: Poles, b: Poles, limits: Thresholds) -> Difference:
+    """How far the poles `a` are from the poles `b`.
+
+    Source: the distance is that of Reynders, Houbrechts and De Roeck (2012), Mech. Syst. Signal Process. 29,
+        |λ_a - λ_b| / |λ| + 1 - MAC, with each part divided by what is allowed.
+    """
+    f = a.frequency_hz[:, None]
+    frequency = np.abs(f - b.frequency_hz) / (limits.frequency_tolerance * f)
+    z = a.damping_ratio[:, None]
+    step = np.abs(z - b.damping_ratio)
+    damping = step / np.maximum(limits.damping_tolerance * z, limits.damping_step)
+    shape = (1 - np.abs(a.shapes.conj().T @ b.shapes) ** 2) / (1 - limits.min_mac)
+    plane = np.hypot(frequency, step / limits.frequency_tolerance)
+    return Difference(frequency, shape, damping, plane + shape)
+
+
+def join(poles: Poles, chain: Indices, limits: Thresholds) -> Indices:
+    """Number of the cluster of each pole, -1 for none: chains of the same pole joined where orders are missing.
+
+    Two chains are of the same pole when their means are within the thresholds and no order has a pole of
+    both: two poles of one order are two modes, however close. The nearest pairs are joined first.
+
+    Args:
+        poles: all poles.
+        chain: number of each pole's chain, -1 for none.
+        limits: as for one order to the next.
+    """
+    mean = cluster_means(poles, chain)
+    n = mean.frequency_hz.size
+    orders, row = np.unique(poles.order, return_inverse=True)
+    present = np.zeros((n, orders.size), dtype=bool)
+    present[chain[chain >= 0], row[chain >= 0]] = True
+    apart = difference(mean, mean, limits)
+    same = (apart.frequency <= 1) & (apart.shape <= 1) & (apart.damping <= 1)
+    same &= ~(present.astype(float) @ present.T.astype(float) > 0)
+    first, second = np.nonzero(np.triu(same, 1))
+    root = np.arange(n)
+    for k in np.argsort(apart.distance[first, second], kind="stable"):
+        a, b = root[first[k]], root[second[k]]
+        if a != b and not np.any(present[a] & present[b]):
+            present[a] |= present[b]
+            root[root == b] = a
+    return np.where(chain >= 0, np.unique(root, return_inverse=True)[1][chain], -1)
+
+
+def keep_long(cluster: Indices) -> Indices:
+    """Numbers of the clusters that are long enough to be modes, renumbered; -1 for the poles of all others.
+
+    The lengths are split into two classes, each around its own mean, as modes last over most orders and
+    chance agreements over few. They are counts, so their square roots are compared, which scatter alike.
+    The class of the
+    short ones holds an empty cluster besides: where nothing agrees by chance, it must not take the shorter
+        modes.
+
+    Source: two-means clustering as in Reynders, Houbrechts and De Roeck (2012), third stage.
+    """
+    if not np.any(cluster >= 0):
+        return cluster
+    length = np.bincount(cluster[cluster >= 0])
+    size = np.sqrt(length)
+    short, long = 0.0, float(np.max(size))
+    for _ in range(length.size):  # each round moves at least one cluster to the other class, or nothing moves
+        is_long = size > (short + long) / 2
+        short, long = np.sum(size[~is_long]) / (1 + np.sum(~is_long)), float(np.mean(size[is_long]))
+    is_long = (size > (short + long) / 2) & (length >= MIN_LENGTH)
+    number = np.where(is_long, np.cumsum(is_long) - 1, -1)
+    return np.where(cluster >= 0, number[cluster], -1)
+
+
+def cluster_means(poles: Poles, cluster: Indices) -> Poles:
+    """The mean of each cluster, with its highest order; shapes are turned to the phase of that one first."""
+    member = np.flatnonzero(cluster >= 0)
+    own = cluster[member]
+    n = int(np.max(own, initial=-1)) + 1
+    highest = np.zeros(n, dtype=np.intp)
+    highest[own] = member  # poles come by rising order, so that the last one written stays
+    part = poles.take(member)
+    share = np.zeros((member.size, n))
+    share[np.arange(member.size), own] = 1 / np.bincount(own, minlength=n)[own]
+    turn = np.sum(part.shapes.conj() * poles.shapes[:, highest[own]], axis=0)
+    shapes = (part.shapes * np.exp(1j * np.angle(turn))) @ share
+    return Poles(
+        poles.order[highest],
+        part.frequency_hz @ share,
+        part.damping_ratio @ share,
+        shapes / np.linalg.norm(shapes, axis=0),
+    )
+
+
+def cluster_scatter(values: Array, cluster: Indices) -> Array:
+    """Standard deviation of the values in each cluster of two or more, shape (n_clusters,)."""
+    own, values = cluster[cluster >= 0], values[cluster >= 0]
+    size = np.bincount(own)
+    mean = np.bincount(own, values) / size
+    return np.asarray(np.sqrt(np.bincount(own, (values - mean[own]) ** 2) / (size - 1)))

@@ -1,0 +1,193 @@
+"""Which poles of models of rising order are the structure's own: those that stay put; and why the others went.
+
+A model of too high an order fits the noise as well, with poles that move from one order to the next. Each
+pole is compared with the nearest one of the next lower order; poles that follow one another form chains;
+chains of one pole are joined to clusters; and the long clusters are the modes.
+"""
+
+from __future__ import annotations
+
+import itertools
+from dataclasses import dataclass, fields
+
+import numpy as np
+from numpy.typing import NDArray
+
+from identification.clusters import (
+    Indices,
+    Poles,
+    Thresholds,
+    cluster_means,
+    cluster_scatter,
+    difference,
+    join,
+    keep_long,
+)
+from identification.errors import IdentificationError
+from identification.modes import Complex, Modes, modal_phase_collinearity
+from identification.recording import Array, frozen
+from identification.systems import Realization
+
+STABLE = "stable"
+
+RULES = {
+    "negative damping": "The pole grows in time.",
+    "damping too high": "The damping ratio exceeds max_damping: hardly an oscillation.",
+    "complex shape": "The modal phase collinearity of the shape is below min_collinearity.",
+    "lowest order": "There is no lower order to compare with.",
+    "frequency jumps": "The nearest pole of the next lower order is more than frequency_tolerance away.",
+    "shape jumps": "The MAC with the nearest pole of the next lower order is below min_mac.",
+    "damping jumps": "The damping differs from the nearest pole's by more than both tolerances.",
+    "double": "Another pole of the same order is nearer to the pole that this one resembles.",
+    "cluster too small": "The pole agrees with lower orders, but at too few of them to be told from chance.",
+}
+"""Why a pole is not taken for the structure's own; the first rule that applies gives the label."""
+
+NAMES = (STABLE, *RULES)
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class Stabilization:
+    """Every oscillating pole of every order, what became of it, and the modes that remain.
+
+    Attributes:
+        orders: order of the model that each pole comes from, rising, shape (n_poles,).
+        frequency_hz: shape (n_poles,).
+        damping_ratio: shape (n_poles,).
+        shapes: of length one, shape (n_outputs, n_poles).
+        label: "stable", or the rule of `RULES` that rejected the pole.
+        cluster: position of the pole's mode in `modes`, -1 for none, shape (n_poles,).
+        modes: mean of each cluster, sorted by frequency. The standard deviations are the scatter over the
+            orders: they tell how well the data define a mode, not how far it may be from the truth.
+    """
+
+    orders: Indices
+    frequency_hz: Array
+    damping_ratio: Array
+    shapes: Complex
+    label: tuple[str, ...]
+    cluster: Indices
+    modes: Modes
+
+    def __post_init__(self) -> None:
+        for name in ("frequency_hz", "damping_ratio"):
+            object.__setattr__(self, name, frozen(getattr(self, name)))
+        for name in ("orders", "shapes", "cluster"):
+            array = np.array(getattr(self, name))
+            array.setflags(write=False)
+            object.__setattr__(self, name, array)
+
+    def __repr__(self) -> str:
+        n_stable = sum(label == STABLE for label in self.label)
+        return f"Stabilization({len(self.label)} poles, {n_stable} stable, {len(self.modes)} modes)"
+
+
+def stabilize(realization: Realization, **thresholds: float) -> Stabilization:
+    """The poles of all orders, each with a verdict, and the modes made of those that stay put.
+
+    Args:
+        realization: models of several orders.
+        **thresholds: fields of `Thresholds` that shall differ from their defaults.
+
+    Raises:
+        IdentificationError: there is no threshold of that name.
+
+    Source: the comparison of orders is that of Peeters and De Roeck (2001), J. Dyn. Syst. Meas. Control 123.
+    """
+    names = [field.name for field in fields(Thresholds)]
+    unknown = sorted(set(thresholds) - set(names))
+    if unknown:
+        raise IdentificationError(f"there is no threshold {unknown[0]!r}; expected one of {', '.join(names)}")
+    limits = Thresholds(**thresholds)
+    poles = _all_poles(realization)
+    rule, chain = _follow(poles, limits)
+    cluster = keep_long(join(poles, chain, limits))
+    rule[(chain >= 0) & (cluster < 0)] = NAMES.index("cluster too small")
+    cluster, mean = _sorted_means(poles, cluster)
+    modes = Modes(
+        mean.frequency_hz,
+        mean.damping_ratio,
+        mean.shapes,
+        realization.systems[0].outputs,
+        cluster_scatter(poles.frequency_hz, cluster),
+        cluster_scatter(poles.damping_ratio, cluster),
+    )
+    return Stabilization(*poles, tuple(NAMES[k] for k in rule), cluster, modes.normalized())
+
+
+def _sorted_means(poles: Poles, cluster: Indices) -> tuple[Indices, Poles]:
+    """Clusters renumbered by rising frequency, and their means in that order."""
+    mean = cluster_means(poles, cluster)
+    rank = np.argsort(mean.frequency_hz, kind="stable")
+    number = np.append(np.argsort(rank), -1)  # the last one serves the poles without a cluster
+    return number[cluster], mean.take(rank)
+
+
+def _all_poles(realization: Realization) -> Poles:
+    """One pole of each conjugate pair of every model, by rising order; real poles do not oscillate."""
+    modes = [system.modes() for system in realization.systems]
+    order = np.repeat(realization.orders, [len(each) for each in modes])
+    shapes = np.hstack([each.shapes for each in modes])
+    length = np.linalg.norm(shapes, axis=0)
+    return Poles(
+        order,
+        np.concatenate([each.frequency_hz for each in modes]),
+        np.concatenate([each.damping_ratio for each in modes]),
+        shapes / np.where(length == 0, 1, length),
+    )
+
+
+def _follow(poles: Poles, limits: Thresholds) -> tuple[Indices, Indices]:
+    """The first rule against each pole, as a position in `NAMES`, and the number of its chain, -1 for none."""
+    rule = _hard_rules(poles, limits)
+    chain = np.full(rule.size, -1)
+    n_chains = 0
+    before = np.empty(0, dtype=np.intp)
+    borders = np.flatnonzero(np.diff(poles.order, prepend=-1, append=-1))
+    for first, last in itertools.pairwise(borders.tolist()):
+        here = first + np.flatnonzero(rule[first:last] == 0)
+        if before.size and here.size:
+            found, mate = _soft_rules(poles.take(here), poles.take(before), limits)
+            rule[here] = found
+            go_on, mate = here[found == 0], before[mate[found == 0]]
+            new = chain[mate] < 0
+            chain[go_on] = np.where(new, n_chains + np.cumsum(new) - 1, chain[mate])
+            n_chains += int(np.sum(new))
+        else:
+            rule[here] = NAMES.index("lowest order")
+        before = here
+    return rule, chain
+
+
+def _hard_rules(poles: Poles, limits: Thresholds) -> Indices:
+    """The first rule against each pole by itself."""
+    return _first(
+        {
+            "negative damping": poles.damping_ratio < 0,
+            "damping too high": poles.damping_ratio > limits.max_damping,
+            "complex shape": modal_phase_collinearity(poles.shapes) < limits.min_collinearity,
+        }
+    )
+
+
+def _soft_rules(here: Poles, before: Poles, limits: Thresholds) -> tuple[Indices, Indices]:
+    """The first rule against following each pole from the lower order, and its nearest pole there."""
+    apart = difference(here, before, limits)
+    mate = np.argmin(apart.distance, axis=1)
+    own = np.arange(mate.size)
+    rule = _first(
+        {
+            "frequency jumps": apart.frequency[own, mate] > 1,
+            "shape jumps": apart.shape[own, mate] > 1,
+            "damping jumps": apart.damping[own, mate] > 1,
+            "double": np.argmin(apart.distance, axis=0)[mate] != own,
+        }
+    )
+    return rule, mate
+
+
+def _first(rules: dict[str, NDArray[np.bool_]]) -> Indices:
+    """Position in `NAMES` of the first rule that applies to each pole; 0 where none does."""
+    numbers = np.array([NAMES.index(name) for name in rules])
+    broken = np.array(list(rules.values()))
+    return np.where(broken.any(axis=0), numbers[np.argmax(broken, axis=0)], 0)
