@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
+from identification.errors import IdentificationError
 from identification.modes import Complex
 from identification.recording import Array
 
@@ -37,6 +38,14 @@ class Thresholds:
     min_mac: float = 0.9
     max_damping: float = 0.2
     min_collinearity: float = 0.0
+
+    def __post_init__(self) -> None:
+        for field in fields(self):
+            value = getattr(self, field.name)
+            if not 0 <= value < 1 or (value == 0 and not field.name.startswith("min")):
+                raise IdentificationError(
+                    f"threshold {field.name} is {value}; expected a number between 0 and 1"
+                )
 
 
 class Poles(NamedTuple):
@@ -110,7 +119,8 @@ def join(poles: Poles, chain: Indices, limits: Thresholds) -> Indices:
     present = np.zeros((n, orders.size), dtype=bool)
     present[chain[chain >= 0], row[chain >= 0]] = True
     apart = difference(mean, mean, limits)
-    same = (apart.frequency <= 1) & (apart.shape <= 1) & (apart.damping <= 1)
+    # Damping drifts most from order to order, so that the means of two chains may be off on either side.
+    same = (apart.frequency <= 1) & (apart.shape <= 1) & (apart.damping <= 2)
     same &= ~(present.astype(float) @ present.T.astype(float) > 0)
     first, second = np.nonzero(np.triu(same, 1))
     root = np.arange(n)

@@ -84,14 +84,21 @@ def ssi_cov(
     H = np.hstack([R[j * stride :][:n_rows].reshape(-1, n_references) for j in range(n_columns)])
     del R
     U, singular_values = leading_subspace(H, wanted[-1] + 2)
+    rank = int(np.sum(singular_values > np.finfo(float).eps * max(H.shape) * singular_values[0]))
     del H
+    if sweep:
+        wanted = [n for n in wanted if n <= rank] or wanted[:1]
+    if wanted[-1] > rank:
+        raise OrderError(
+            f"order {wanted[-1]} exceeds {rank}, the numerical rank of the Hankel matrix; lower the order"
+        )
     systems = tuple(
         _outputs_only(A, C * scale, recording)
         for A, C in shift_invariance(U, singular_values, n_outputs=n_outputs, orders=wanted)
     )
     if order is None:
         order = _largest_gap(singular_values, wanted)
-        notes.append(f"Order {order} is where the singular values drop most steeply.")
+        notes.append(f"The singular values drop most steeply after the first {order}.")
     settings: dict[str, int | float | str] = {
         "n_rows": n_rows,
         "n_columns": n_columns,
