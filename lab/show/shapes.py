@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -73,3 +74,52 @@ def dof_shapes(result: Result, dofs: Sequence[str]) -> tuple[np.ndarray, np.ndar
             shapes[:, j] = [full.get(dof, 0) for dof in dofs]
             known[:, j] = [dof in full for dof in dofs]
     return aligned(shapes), known
+
+
+@dataclass(frozen=True, eq=False)
+class ShapeTable:
+    """Displacement shapes of identified modes, and of their true partners, at the same points.
+
+    Attributes:
+        labels: names of the points: degrees of freedom where M, C, K were recovered, else output channels.
+        estimate: aligned shapes, (n_points, n_modes) complex.
+        truth: likewise, scaled to fit the estimate; NaN where a mode has no partner.
+    """
+
+    labels: tuple[str, ...]
+    estimate: np.ndarray
+    truth: np.ndarray
+
+
+def shape_table(result: Result) -> ShapeTable:
+    """The most complete displacement shapes that the result offers."""
+    labels, estimate, truth_at = _measured(result) if result.second_order is None else _recovered(result)
+    estimate = aligned(estimate)
+    truth = np.full(estimate.shape, np.nan, dtype=complex)
+    for pair in result.comparison.pairs if result.comparison else ():
+        if truth_at is None:
+            break
+        t, e = truth_at[:, pair.truth], estimate[:, pair.estimate]
+        power = np.vdot(t, t).real
+        truth[:, pair.estimate] = t * (np.vdot(t, e) / power if power else 1.0)
+    return ShapeTable(labels, estimate, truth)
+
+
+def _measured(result: Result) -> tuple[tuple[str, ...], np.ndarray, np.ndarray | None]:
+    rows, estimate = displacement_shapes(result.modes)
+    truth = None if result.truth_modes is None else displacement_shapes(result.truth_modes)[1]
+    return tuple(result.modes.outputs[row].name for row in rows), estimate, truth
+
+
+def _recovered(result: Result) -> tuple[tuple[str, ...], np.ndarray, np.ndarray | None]:
+    assert result.second_order is not None
+    dofs = result.second_order.dofs
+    estimate, _ = dof_shapes(result, dofs)
+    if result.truth_second_order is None or result.truth_modes is None:
+        return dofs, estimate, None
+    if not set(dofs) <= set(result.truth_second_order.dofs):
+        return dofs, estimate, None
+    rows = [result.truth_second_order.dofs.index(dof) for dof in dofs]
+    complete = result.truth_second_order.modes()
+    nearest = [int(np.argmin(np.abs(complete.frequency_hz - f))) for f in result.truth_modes.frequency_hz]
+    return dofs, estimate, complete.shapes[rows][:, nearest]

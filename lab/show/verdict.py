@@ -60,7 +60,7 @@ def verdict(result: Result) -> Verdict:
         return Verdict(
             FAILED, f"Failed: {len(missed)} of {_count(n, 'criterion', 'criteria')} missed: {reasons}."
         )
-    met = "the criterion is met" if n == 1 else f"all {n} criteria are met"
+    met = {1: "the criterion is met", 2: "both criteria are met"}.get(n, f"all {n} criteria are met")
     return Verdict(PASSED, f"Passed: {met}. {_found(result)}")
 
 
@@ -102,9 +102,10 @@ def _found(result: Result) -> str:
         damping = [abs(pair.damping_error) for pair in comparison.pairs if math.isfinite(pair.damping_error)]
         damping_part = f"damping ratios within {percent(max(damping))}, " if damping else ""
         worst_mac = min(pair.mac for pair in comparison.pairs)
+        agreement = "1" if lowered(worst_mac) == "1" else f"at least {lowered(worst_mac)}"
         parts.append(
             f"{len(comparison.pairs)} of {_count(n_true, 'true mode', 'true modes')} found, "
-            f"frequencies within {percent(worst_frequency)}, {damping_part}MAC at least {lowered(worst_mac)}"
+            f"frequencies within {percent(worst_frequency)}, {damping_part}MAC {agreement}"
         )
     else:
         parts.append(f"none of {_count(n_true, 'true mode', 'true modes')} was found")
@@ -154,10 +155,11 @@ def percent(ratio: float) -> str:
 
 
 def lowered(mac: float) -> str:
-    """A MAC with the digits that tell it from 1, never rounded up to 1."""
+    """A MAC cut after the first digit that tells it from 1, so that it is never rounded up."""
     if mac >= 1 - 1e-12:
-        return "1 - 1e-12" if mac < 1 else "1"
-    return f"{mac:.4f}" if mac < 0.9995 else f"1 - {1 - mac:.0e}"
+        return "1"
+    decimals = max(2, math.ceil(-math.log10(1 - mac)))
+    return f"{math.floor(mac * 10**decimals) / 10**decimals:.{decimals}f}"
 
 
 def _count(n: int, one: str, many: str) -> str:

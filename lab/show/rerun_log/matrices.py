@@ -9,14 +9,13 @@ import rerun as rr
 import rerun.blueprint as rrb
 
 from identification.modes import mac
-from identification.systems import SecondOrder
 from lab.result import Result
 from lab.show.drawing import diverging, sequential
 from lab.show.rerun_log.plot import log_texts
+from lab.show.tables import MATRICES, same_dofs
 
 MAX_NUMBERED = 12
 """Matrices up to this size carry their numbers."""
-MATRICES = (("mass", "M", "kg"), ("damping", "C", "N s/m"), ("stiffness", "K", "N/m"))
 
 
 def log_matrices(stream: rr.RecordingStream, result: Result) -> list[rrb.View]:
@@ -24,7 +23,7 @@ def log_matrices(stream: rr.RecordingStream, result: Result) -> list[rrb.View]:
     found = result.second_order
     if found is None:
         return []
-    truth = ordered(result.truth_second_order, found.dofs)
+    truth = same_dofs(result.truth_second_order, found.dofs)
     views = []
     for name, letter, unit in MATRICES:
         value = getattr(found, name)
@@ -74,14 +73,6 @@ def log_mac(stream: rr.RecordingStream, result: Result) -> list[rrb.View]:
         _log_heat(stream, f"/mac/{name}", sequential(value), numbers, rows, columns)
         views.append(_heat_view(f"/mac/{name}", f"{title} [Hz]", value.shape))
     return views
-
-
-def ordered(truth: SecondOrder | None, dofs: Sequence[str]) -> SecondOrder | None:
-    """The true matrices in the order of `dofs`; None where they are of other degrees of freedom."""
-    if truth is None or set(truth.dofs) != set(dofs):
-        return None
-    take = np.ix_(*[[truth.dofs.index(dof) for dof in dofs]] * 2)
-    return SecondOrder(truth.mass[take], truth.damping[take], truth.stiffness[take], tuple(dofs))
 
 
 def _log_heat(

@@ -1,0 +1,204 @@
+"""Figures of the measured signals: time histories, spectra, frequency responses."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+
+from identification.recording import Channel, Recording
+from identification.systems import StateSpace
+from lab.result import Result
+from lab.show.drawing import SERIES
+from lab.show.figures.canvas import DASHES, Drawing, drawing, few_ticks, logarithmic, mark_modes, plain
+from lab.show.signals import Spectra, envelope, frequency_response, upper_frequency
+
+MAX_INPUTS, MAX_OUTPUTS = 4, 8
+"""Time histories shown."""
+MAX_RESPONSES = 4
+"""Frequency responses shown."""
+Look = dict[str, Any]
+MEASURED: Look = {"color": "0.6", "linewidth": 2.0}
+IDENTIFIED: Look = {"color": SERIES[0], "linestyle": (0, (4, 2)), "linewidth": 1.0}
+MAX_LINES = 6
+"""Spectra drawn one by one in one frame; of more, all are drawn alike with their mean."""
+
+
+def time_histories(recording: Recording) -> Drawing:
+    """One strip per channel, the records one after the other."""
+    parts = [envelope(record, recording.sample_rate, n_bins=400) for record in recording.records]
+    lengths = [record.n_samples / recording.sample_rate for record in recording.records]
+    starts = np.concatenate([[0.0], np.cumsum(lengths)])
+    strips = [("inputs", row, c) for row, c in enumerate(recording.inputs[:MAX_INPUTS])]
+    strips += [("outputs", row, c) for row, c in enumerate(recording.outputs[:MAX_OUTPUTS])]
+
+    def paint(figure: Figure) -> None:
+        frames = figure.subplots(len(strips), 1, sharex=True, squeeze=False)[:, 0]
+        for axes, (side, row, channel) in zip(frames, strips, strict=True):
+            for start, part in zip(starts, parts, strict=False):
+                signals = getattr(part, side)
+                if not signals.shape[0]:
+                    continue
+                _strip(axes, start + part.time, signals[row], part.samples_per_bin, held=side == "inputs")
+                if start:
+                    axes.axvline(start, color="0.5", linestyle=":", linewidth=0.8)
+            axes.set_ylabel(
+                f"{plain(channel.name)}\n[{_upright(channel.unit)}]", rotation=0, ha="right", va="center"
+            )
+            few_ticks(axes, 2)
+        frames[-1].set_xlabel("time [s]")
+        frames[-1].set_xlim(0, starts[-1])
+
+    caption = "Time histories."
+    if len(parts) > 1:
+        caption += " Dotted lines: where the next record begins."
+    if max(part.samples_per_bin for part in parts) > 1:
+        caption += " The band runs from the smallest to the largest sample around each instant."
+    return drawing("time", 0.4 + 0.55 * len(strips), caption + _left_out(recording), paint)
+
+
+def _strip(axes: Axes, time: np.ndarray, signal: np.ndarray, samples_per_bin: int, *, held: bool) -> None:
+    if samples_per_bin > 1:
+        axes.fill_between(time[::2], signal[::2], signal[1::2], color="0.15", linewidth=0.3)
+    else:
+        axes.plot(time, signal, color="0.15", linewidth=0.7, drawstyle="steps-post" if held else "default")
+
+
+def _left_out(recording: Recording) -> str:
+    more = [
+        f"{len(channels) - limit} of {len(channels)} {side}"
+        for side, channels, limit in (
+            ("inputs", recording.inputs, MAX_INPUTS),
+            ("outputs", recording.outputs, MAX_OUTPUTS),
+        )
+        if len(channels) > limit
+    ]
+    return f" Not shown: {' and '.join(more)}." if more else ""
+
+
+def output_spectra(recording: Recording, spectrum: Spectra, result: Result) -> Drawing:
+    """Spectral densities of the outputs, one frame per unit, with the identified modes."""
+    units = list(dict.fromkeys(channel.unit for channel in recording.outputs))
+    top = upper_frequency(recording.sample_rate, result.modes.frequency_hz)
+    shown = (spectrum.frequency_hz <= top) & (spectrum.frequency_hz > 0)
+
+    def paint(figure: Figure) -> None:
+        frames = figure.subplots(len(units), 1, sharex=True, squeeze=False)[:, 0]
+        for number, (axes, unit) in enumerate(zip(frames, units, strict=True)):
+            rows = [row for row, channel in enumerate(recording.outputs) if channel.unit == unit]
+            names = [recording.outputs[row].name for row in rows]
+            _densities(axes, spectrum.frequency_hz[shown], spectrum.output_density[rows][:, shown], names)
+            axes.set_xlim(0, top)
+            axes.set_ylabel(f"[({_upright(unit)})²/Hz]")
+            mark_modes(axes, result.modes.frequency_hz, numbered=number == 0)
+        frames[-1].set_xlabel("frequency [Hz]")
+
+    window = "whole records" if spectrum.window == "none" else "Hann windows"
+    caption = (
+        f"Power spectral density of the outputs, mean of {spectrum.n_averages} {window}, "
+        f"lines {spectrum.frequency_hz[1]:.3g} Hz apart. Dotted: identified modes."
+    )
+    if any(sum(channel.unit == unit for channel in recording.outputs) > MAX_LINES for unit in units):
+        caption += " Grey: single channels; black: their mean."
+    return drawing("spectra", 0.4 + 1.9 * len(units), caption, paint)
+
+
+def _densities(axes: Axes, frequency: np.ndarray, density: np.ndarray, names: Sequence[str]) -> None:
+    positive = np.where(density > 0, density, np.nan)
+    if len(names) <= MAX_LINES:
+        for i, name in enumerate(names):
+            axes.plot(frequency, positive[i], color=SERIES[i], linestyle=DASHES[i], label=plain(name))
+        axes.legend(loc="center left", bbox_to_anchor=(1.0, 0.5))
+    else:
+        axes.plot(frequency, positive.T, color="0.7", linewidth=0.5)
+        axes.plot(frequency, np.mean(density, axis=0), color="black")
+    if np.isfinite(positive).any():
+        logarithmic(axes)
+
+
+def responses(recording: Recording, spectrum: Spectra, result: Result) -> Drawing | None:
+    """Magnitude and phase of a few responses, measured and of the identified model; None without inputs."""
+    measured = frequency_response(spectrum)
+    if measured is None:
+        return None
+    pairs = chosen_pairs(recording.inputs, recording.outputs)
+    top = upper_frequency(recording.sample_rate, result.modes.frequency_hz)
+    shown = (spectrum.frequency_hz <= top) & (spectrum.frequency_hz > 0)
+    frequency = spectrum.frequency_hz[shown]
+    system, fine = result.realization.system, np.linspace(frequency[0], frequency[-1], 400)
+    n_columns = min(2, len(pairs))
+    n_rows = -(-len(pairs) // n_columns)
+
+    def paint(figure: Figure) -> None:
+        heights = [2.2, 1.0] * n_rows
+        frames = figure.subplots(2 * n_rows, n_columns, sharex=True, squeeze=False, height_ratios=heights)
+        for number, (i, j) in enumerate(pairs):
+            upper, lower = frames[
+                2 * (number // n_columns) : 2 * (number // n_columns) + 2, number % n_columns
+            ]
+            _response(upper, lower, frequency, measured[shown, i, j], "measured", MEASURED)
+            model = _model_response(system, recording.outputs[i], recording.inputs[j], fine)
+            if model is not None:
+                _response(upper, lower, fine, model, "identified", IDENTIFIED)
+            logarithmic(upper)
+            unit = f"{_upright(recording.outputs[i].unit)} / {_upright(recording.inputs[j].unit)}"
+            upper.set_title(plain(f"{recording.outputs[i].name} / {recording.inputs[j].name}"))
+            upper.set_ylabel(f"[{unit}]")
+            lower.set_ylabel("phase [°]")
+            lower.set_ylim(-190, 190)
+            lower.set_yticks([-180, 0, 180])
+            upper.set_xlim(0, top)
+        for axes in frames[
+            2 * ((len(pairs) - 1) // n_columns) :: 2, len(pairs) % n_columns or n_columns :
+        ].ravel():
+            axes.set_visible(False)
+        for axes in frames[-1]:
+            axes.set_xlabel("frequency [Hz]")
+        frames[0, 0].legend(loc="best")
+
+    total = len(recording.inputs) * len(recording.outputs)
+    caption = "Frequency responses (H1), magnitude and phase: grey measured, dashed the identified model."
+    if total > len(pairs):
+        caption += f" {len(pairs)} of {total} shown, driving points first."
+    return drawing("frf", 0.3 + 2.7 * n_rows, caption, paint)
+
+
+def chosen_pairs(inputs: Sequence[Channel], outputs: Sequence[Channel]) -> list[tuple[int, int]]:
+    """Positions (output, input) of the responses to show: driving points first, then others of each input."""
+    everything = [(i, j) for i in range(len(outputs)) for j in range(len(inputs))]
+
+    def rank(pair: tuple[int, int]) -> tuple[bool, int, int]:
+        i, j = pair
+        driving = bool(outputs[i].dof) and outputs[i].dof == inputs[j].dof
+        return (not driving, (i - j) % len(outputs), j)
+
+    return sorted(sorted(everything, key=rank)[:MAX_RESPONSES], key=lambda pair: (pair[1], pair[0]))
+
+
+def _model_response(
+    system: StateSpace, output: Channel, drive: Channel, frequency: np.ndarray
+) -> np.ndarray | None:
+    """Of the identified model, from one input to one output; None when it has no such input."""
+    names_in, names_out = ([c.name for c in channels] for channels in (system.inputs, system.outputs))
+    if drive.name not in names_in or output.name not in names_out:
+        return None
+    i, j = names_out.index(output.name), names_in.index(drive.name)
+    return np.asarray(system.frequency_response(frequency)[:, i, j])
+
+
+def _response(upper: Axes, lower: Axes, frequency: np.ndarray, H: np.ndarray, label: str, look: Look) -> None:
+    if frequency.size <= 100:
+        look = {**look, "marker": "."}
+    upper.plot(frequency, np.where(np.abs(H) > 0, np.abs(H), np.nan), label=label, **look)
+    phase = np.degrees(np.angle(H))
+    # A jump from -180 to 180 is no motion: break the line there.
+    cut = np.flatnonzero(np.abs(np.diff(phase)) > 180) + 1
+    lower.plot(np.insert(frequency, cut, np.nan), np.insert(phase, cut, np.nan), **look)
+
+
+def _upright(unit: str) -> str:
+    """The unit as printed: m/s² for m/s^2."""
+    return unit.replace("^2", "²")

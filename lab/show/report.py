@@ -1,0 +1,140 @@
+"""The report: verdict, the tables it rests on, figures, and what it takes to reproduce it, in one HTML file.
+
+The only place that imports jinja2. All that comes from data is escaped.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import importlib.metadata
+import platform
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+import jinja2
+from markupsafe import Markup
+
+from identification.recording import Recording
+from lab.result import Result
+from lab.show.figures import Drawing, draw, matrix_maps
+from lab.show.tables import MAX_PRINTED, criteria_rows, matrix_summary, matrix_tables, modes_table, same_dofs
+from lab.show.verdict import verdict
+
+PACKAGES = ("virtual-modal-lab", "mujoco", "numpy", "scipy", "h5py")
+"""What the numbers depend on."""
+BESIDE = ("recording.h5", "result.json")
+"""Files of the same folder that the report vouches for."""
+
+
+def write_report(
+    path: str | Path,
+    result: Result,
+    recording: Recording,
+    *,
+    scenario_text: str = "",
+    command: str = "",
+    facts: Mapping[str, str] | None = None,
+) -> None:
+    """Writes one HTML file that needs no other; the same data give the same bytes.
+
+    Args:
+        path: file to come; recording.h5 and result.json beside it are named with their checksums.
+        result: what was identified.
+        recording: what it was identified from.
+        scenario_text: the scenario as written.
+        command: how the lab was called.
+        facts: further facts to reproduce the result, by name.
+    """
+    path = Path(path)
+    page = _template().render(
+        title=result.title or "Modal test",
+        about=_about(result, recording),
+        verdict=verdict(result),
+        criteria=criteria_rows(result),
+        modes=modes_table(result),
+        **_matrices(result),
+        figures=[_inline(drawing) for drawing in draw(result, recording)],
+        notes=result.notes,
+        warnings=result.warnings,
+        command=command,
+        scenario_text=scenario_text,
+        facts=list(_all_facts(path, result, scenario_text, facts or {}).items()),
+    )
+    path.write_text(page, encoding="utf-8", newline="\n")
+
+
+def _template() -> jinja2.Template:
+    environment = jinja2.Environment(
+        loader=jinja2.FileSystemLoader(Path(__file__).parent),
+        autoescape=True,
+        trim_blocks=True,
+        lstrip_blocks=True,
+        undefined=jinja2.StrictUndefined,
+        finalize=_visible,
+    )
+    return environment.get_template("report.html.jinja")
+
+
+def _visible(value: Any) -> Any:
+    """Text without the characters that HTML forbids; markup of our own as it is."""
+    if isinstance(value, Markup) or not isinstance(value, str):
+        return value
+    return "".join(c if c.isprintable() or c in "\n\t" else "\N{REPLACEMENT CHARACTER}" for c in value)
+
+
+def _inline(drawing: Drawing) -> dict[str, Any]:
+    # The SVG is ours: its texts were escaped when it was written.
+    return {"name": drawing.name, "svg": Markup(drawing.svg), "caption": drawing.caption}
+
+
+def _about(result: Result, recording: Recording) -> str:
+    realization, n = result.realization, len(recording.records)
+    kinds = ", ".join(sorted({record.kind.replace("_", " ") for record in recording.records}))
+    return (
+        f"Identified by {realization.method}, order {realization.order}, "
+        f"from {n} record{'s' if n > 1 else ''} ({kinds}) "
+        f"with {len(recording.inputs)} inputs and {len(recording.outputs)} outputs, "
+        f"{recording.duration:g} s at {recording.sample_rate:g} Hz."
+    )
+
+
+def _matrices(result: Result) -> dict[str, Any]:
+    found = result.second_order
+    if found is None:
+        return {"matrices": [], "matrix_summary": [], "matrix_figure": None, "dofs": ()}
+    truth = same_dofs(result.truth_second_order, found.dofs)
+    printed = len(found.dofs) <= MAX_PRINTED
+    return {
+        "matrices": matrix_tables(found, truth) if printed else [],
+        "matrix_summary": matrix_summary(found, truth) if truth is not None else [],
+        "matrix_figure": None if printed else _inline(matrix_maps(found, truth)),
+        "dofs": found.dofs,
+    }
+
+
+def _all_facts(path: Path, result: Result, scenario_text: str, facts: Mapping[str, str]) -> dict[str, str]:
+    """What was given, then how the method was set, what it ran on, and what the files contained."""
+    settings = ", ".join(f"{name} = {value}" for name, value in result.realization.settings.items())
+    own = {"Method": f"{result.realization.method}, order {result.realization.order}"}
+    if settings:
+        own["Settings of the method"] = settings
+    own["Versions"] = ", ".join(_versions(PACKAGES))
+    own["Machine"] = f"{platform.system()} {platform.machine()}"
+    if scenario_text:
+        own["SHA-256 of the scenario"] = hashlib.sha256(scenario_text.encode("utf-8", "replace")).hexdigest()
+    for name in BESIDE:
+        if (path.parent / name).is_file():
+            with (path.parent / name).open("rb") as file:
+                own[f"SHA-256 of {name}"] = hashlib.file_digest(file, "sha256").hexdigest()
+    return {**facts, **{name: value for name, value in own.items() if name not in facts}}
+
+
+def _versions(packages: Sequence[str]) -> list[str]:
+    versions = [f"Python {platform.python_version()}"]
+    for name in packages:
+        try:
+            versions.append(f"{name} {importlib.metadata.version(name)}")
+        except importlib.metadata.PackageNotFoundError:
+            versions.append(f"{name} not installed as a package")
+    return versions
