@@ -99,7 +99,7 @@ def choose_order(P: Array, S: Array, Q: Array, *, n_outputs: int, n_inputs: int)
     largest value ends the signal. Measured data end in a floor of noise. What is left beyond an order
     n, taken for noise with a variance of its own in each output and each input, has no singular value
     much above the root of the largest mean square of a row plus that of a column. The order is the
-    first one whose next value is within 1.3 times that edge (the margin covers the repetition of
+    first one whose next value is within 1.5 times that edge (the margin covers the repetition of
     entries in a Hankel matrix), made even as an oscillation takes two states.
 
     Args:
@@ -130,7 +130,7 @@ def choose_order(P: Array, S: Array, Q: Array, *, n_outputs: int, n_inputs: int)
     share = rows * columns / ((rows - n) * (columns - n))  # the singular vectors kept took noise with them
     row = share * _largest_mean_square(P, s, n_outputs)[n]
     column = share * _largest_mean_square(Q, s, n_inputs)[n]
-    edge = 1.3 * (np.sqrt(row) + np.sqrt(column))
+    edge = 1.5 * (np.sqrt(row) + np.sqrt(column))
     below = np.flatnonzero(s[n] <= edge)
     if not below.size:
         order = max(2 * int(n[-1] // 2), 1)

@@ -1,0 +1,47 @@
+"""Least squares over records longer than memory: triangular factors that grow block by block."""
+
+from __future__ import annotations
+
+import numpy as np
+import scipy.linalg
+
+from identification.recording import Array, Recording
+
+FROM_REST = ("pulse", "impact")
+"""Kinds of record that begin before the structure moves."""
+
+BLOCK = 4096
+"""Rows that are brought to triangular form at a time."""
+
+
+def rms(recording: Recording) -> Array:
+    """Root mean square of each input, then each output, over all records."""
+    total = np.zeros(len(recording.inputs) + len(recording.outputs))
+    for record in recording.records:
+        for u, y in record.blocks(1 << 16):
+            total += np.concatenate([np.sum(u**2, axis=1), np.sum(y**2, axis=1)])
+    return np.asarray(np.sqrt(total / recording.n_samples))
+
+
+def triangular(R: Array, rows: Array) -> Array:
+    """Triangular factor of the rows stacked below R: exact, and no larger than the columns."""
+    stacked = np.vstack([R, rows])
+    return np.asarray(
+        scipy.linalg.qr(stacked, mode="r", overwrite_a=True, check_finite=False)[0][: stacked.shape[1]]
+    )
+
+
+def least_squares(R: Array, right: Array, cutoff: float) -> tuple[Array, int]:
+    """Smallest X that minimizes |R X - right|, and the rank.
+
+    Args:
+        R: shape (n_rows, n_columns).
+        right: shape (n_rows, n_right).
+        cutoff: singular values below this part of the largest count as zero, columns scaled to equal size.
+    """
+    size = np.linalg.norm(R, axis=0)
+    size[size == 0] = 1
+    U, s, Vt = scipy.linalg.svd(R / size)
+    rank = int(np.sum(s > cutoff * s[0]))
+    X = Vt[:rank].T @ ((U[:, :rank].T @ right) / s[:rank, None])
+    return X / size[:, None], rank
