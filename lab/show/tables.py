@@ -97,9 +97,10 @@ def modes_table(result: Result) -> ModesTable:
         rows.append(tuple(cells))
     parts = []
     if result.stabilization is not None and not mixed:
-        parts.append("All modes stay put over the model orders.")
+        parts.append("All modes are stable over the model orders.")
     if result.modes.frequency_std is not None:
-        parts.append("± one standard deviation.")
+        over = "" if result.stabilization is None else " of the scatter over the model orders"
+        parts.append(f"± one standard deviation{over}.")
     if compared:
         parts.append("Errors are relative to the truth.")
     return ModesTable(tuple(heads), tuple(rows), " ".join(parts))

@@ -3,16 +3,17 @@
 from __future__ import annotations
 
 from pathlib import Path
-from types import SimpleNamespace
 
 import numpy as np
 
 from identification.modes import Modes
 from identification.recording import Channel, Record, Recording
+from identification.stability import Stabilization
 from identification.systems import Realization, SecondOrder, StateSpace
 from lab.compare import compare
 from lab.result import Criterion, Result
 from lab.rig import Rig
+from lab.simulate import Motion
 
 MODELS = Path(__file__).parents[2] / "models"
 RATE = 20.0
@@ -42,7 +43,7 @@ def random_recording(rig: Rig, n_samples: int = 20_000, *, rate: float = RATE, s
     )
 
 
-def motion_of(rig: Rig, recording: Recording) -> SimpleNamespace:
+def motion_of(rig: Rig, recording: Recording) -> Motion:
     """What `lab.simulate.motion` gives, for the first record."""
     truth, n = rig.second_order(), len(rig.dofs)
     B = rig.state_space().B[n:]
@@ -51,7 +52,7 @@ def motion_of(rig: Rig, recording: Recording) -> SimpleNamespace:
     system = truth.state_space(truth.mass @ B, eye, zero, zero, rig.inputs, channels).sampled(recording.dt)
     u = np.asarray(recording.records[0].inputs[:, :])
     time = np.arange(u.shape[1]) * recording.dt
-    return SimpleNamespace(time=time, position=system.simulate(u), inputs=u)
+    return Motion(time, system.simulate(u), u)
 
 
 def chain_result(
@@ -91,7 +92,7 @@ def chain_result(
         realization=Realization(
             "era", (system,), values, system.n_states, {"n_rows": 50}, ("order from a clear gap",)
         ),
-        stabilization=stabilization(system, modes),  # type: ignore[arg-type]
+        stabilization=stabilization(system, modes),
         truth_modes=truth,
         truth_second_order=true_matrices,
         comparison=comparison,
@@ -104,7 +105,7 @@ def chain_result(
     )
 
 
-def stabilization(system: StateSpace, modes: Modes, seed: int = 9) -> SimpleNamespace:
+def stabilization(system: StateSpace, modes: Modes, seed: int = 9) -> Stabilization:
     """Poles that stay at every order, and random ones with a reason for their rejection."""
     rng = np.random.default_rng(seed)
     orders, frequency, damping, label, cluster = [], [], [], [], []
@@ -121,11 +122,13 @@ def stabilization(system: StateSpace, modes: Modes, seed: int = 9) -> SimpleName
             damping.append(rng.uniform(-0.1, 0.5))
             label.append(str(rng.choice(["frequency jumps", "negative damping", "complex shape"])))
             cluster.append(-1)
-    return SimpleNamespace(
-        orders=np.array(orders),
-        frequency_hz=np.array(frequency),
-        damping_ratio=np.array(damping),
-        label=tuple(label),
-        cluster=np.array(cluster),
-        modes=modes,
+    shapes = np.ones((len(modes.outputs), len(orders)), dtype=complex)
+    return Stabilization(
+        np.array(orders),
+        np.array(frequency),
+        np.array(damping),
+        shapes,
+        tuple(label),
+        np.array(cluster),
+        modes,
     )

@@ -10,6 +10,7 @@ from matplotlib.figure import Figure
 from matplotlib.ticker import MaxNLocator
 
 from identification.modes import mac
+from identification.stability import NAMES, RULES, STABLE
 from identification.systems import SecondOrder
 from lab.result import Result
 from lab.show.drawing import SERIES
@@ -83,7 +84,7 @@ def stabilization_diagram(result: Result, spectrum: Spectra | None) -> Drawing |
         return None
     top = upper_frequency(result.sample_rate, result.modes.frequency_hz)
     labels = np.array(diagram.label)
-    reasons = sorted(set(diagram.label) - {"stable"})
+    reasons = [rule for rule in NAMES if rule in set(diagram.label) - {STABLE}]
 
     def paint(figure: Figure) -> None:
         axes = figure.subplots()
@@ -100,7 +101,7 @@ def stabilization_diagram(result: Result, spectrum: Spectra | None) -> Drawing |
                 markeredgewidth=0.7,
                 label=text,
             )
-        own = labels == "stable"
+        own = labels == STABLE
         place = diagram.frequency_hz[own], diagram.orders[own]
         axes.plot(*place, "o", markersize=2.8, color=SERIES[0], label=f"stable ({int(own.sum())})")
         axes.set_xlim(0, top)
@@ -118,6 +119,8 @@ def stabilization_diagram(result: Result, spectrum: Spectra | None) -> Drawing |
     caption = "Stabilization diagram. Dotted: the modes accepted; grey line: mean spectrum of the outputs."
     if beyond:
         caption += f" {beyond} poles lie above {top:.4g} Hz."
+    if reasons:
+        caption += " Why poles were rejected. " + " ".join(f"{r}: {RULES[r]}" for r in reasons)
     return drawing("stabilization", 3.6, caption, paint)
 
 

@@ -11,6 +11,7 @@ import rerun.blueprint as rrb
 
 from lab.show import structure
 from lab.show.drawing import SERIES, diverging, rgb
+from lab.show.springs import drawn_springs, ground_ends
 
 if TYPE_CHECKING:
     from lab.rig import Rig
@@ -83,7 +84,7 @@ def log_solids(stream: rr.RecordingStream, origin: str, rig: Rig, *, named: bool
         body = rig.model.body(solid.body).name
         label = [body] if named and body and solid.body else None
         stream.log(f"{_body(origin, rig, solid.body)}/solid{number}", *_archetypes(solid, label), static=True)
-    feet = structure.ground_ends(rig)
+    feet = ground_ends(rig, structure.spacing(rig))
     if len(feet):
         half = np.full((len(feet), 3), 0.03 * structure.spacing(rig))
         boxes = rr.Boxes3D(centers=feet, half_sizes=half, colors=GROUND, fill_mode="solid")
@@ -106,9 +107,7 @@ def log_frames(
         )
     limit = float(np.max(np.abs(frames.extension), initial=0.0))
     radius = 0.01 * structure.spacing(rig)
-    for row, path, extension in zip(
-        structure.drawn_springs(rig), frames.paths, frames.extension, strict=True
-    ):
+    for row, path, extension in zip(drawn_springs(rig), frames.paths, frames.extension, strict=True):
         entity = join(origin, "springs", rig.springs[row].name)
         stream.log(entity, rr.LineStrips3D.from_fields(radii=radius), static=True)
         colors = diverging(extension, limit)

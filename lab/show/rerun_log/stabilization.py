@@ -7,6 +7,7 @@ import rerun as rr
 import rerun.blueprint as rrb
 
 from identification.recording import Recording
+from identification.stability import NAMES, STABLE
 from lab.result import Result
 from lab.show.drawing import SERIES, Axes, rgb
 from lab.show.rerun_log.plot import log_axes, log_texts, plot_view
@@ -14,8 +15,9 @@ from lab.show.rerun_log.scene import join
 from lab.show.signals import mean_density, spectra, upper_frequency
 
 ORIGIN = "/modes/stabilization"
-STABLE = "stable"
 REJECTED = (SERIES[1], SERIES[3], SERIES[4], SERIES[5], SERIES[0], SERIES[7])
+PER_ROW = 5
+"""Entries of the legend side by side."""
 FAINT = (120, 120, 120)
 
 
@@ -30,7 +32,7 @@ def log_stabilization(stream: rr.RecordingStream, result: Result, recording: Rec
     _log_spectrum(stream, axes, recording)
     _log_modes(stream, axes, result)
     points, labels = axes.at(diagram.frequency_hz, diagram.orders), np.array(diagram.label)
-    reasons = [STABLE, *sorted(set(diagram.label) - {STABLE})]
+    reasons = [name for name in NAMES if name in diagram.label]
     for number, reason in enumerate(reasons):
         own = labels == reason
         shown = own & (diagram.frequency_hz <= top)
@@ -38,14 +40,19 @@ def log_stabilization(stream: rr.RecordingStream, result: Result, recording: Rec
         radius = -3.0 if reason == STABLE else -1.8
         entity = f"{ORIGIN}/{STABLE}" if reason == STABLE else join(ORIGIN, "rejected", reason)
         stream.log(entity, rr.Points2D(points[shown], colors=color, radii=radius), static=True)
-        place = [[(number + 0.5) * axes.width / len(reasons), axes.height + 14]]
+        row, column = divmod(number, PER_ROW)
+        place = [[(column + 0.5) * axes.width / PER_ROW, axes.height + 14 + 16 * row]]
         text = f"{reason} ({int(own.sum())})"
         key = rr.Points2D(place, colors=color, radii=-4.0, labels=[text], show_labels=True)
         stream.log(f"{ORIGIN}/legend/{number}", key, static=True)
     beyond = int(np.sum(diagram.frequency_hz > top))
     name = "Stabilization diagram: model order over frequency [Hz], spectrum behind (six decades)"
     cut = f"; {beyond} poles lie above {top:.4g} Hz" if beyond else ""
-    return [plot_view(ORIGIN, name + cut, axes, above=24.0, below=28.0)]
+    return [
+        plot_view(
+            ORIGIN, name + cut, axes, above=24.0, below=12.0 + 16.0 * (1 + (len(reasons) - 1) // PER_ROW)
+        )
+    ]
 
 
 def _log_spectrum(stream: rr.RecordingStream, axes: Axes, recording: Recording) -> None:
