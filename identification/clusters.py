@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from identification.errors import IdentificationError
-from identification.modes import Complex
+from identification.modes import Complex, Modes
 from identification.recording import Array
 
 Indices = NDArray[np.intp]
@@ -62,6 +62,13 @@ class Poles(NamedTuple):
     frequency_hz: Array
     damping_ratio: Array
     shapes: Complex
+
+    @classmethod
+    def of(cls, modes: Modes, order: int = 0) -> Poles:
+        """The poles of modes, all of one order."""
+        length = np.linalg.norm(modes.shapes, axis=0)
+        shapes = modes.shapes / np.where(length == 0, 1, length)
+        return cls(np.full(len(modes), order), modes.frequency_hz, modes.damping_ratio, shapes)
 
     def take(self, which: Indices | slice) -> Poles:
         """The poles at the given positions."""

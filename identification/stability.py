@@ -125,16 +125,8 @@ def _sorted_means(poles: Poles, cluster: Indices) -> tuple[Indices, Poles]:
 
 def _all_poles(realization: Realization) -> Poles:
     """One pole of each conjugate pair of every model, by rising order; real poles do not oscillate."""
-    modes = [system.modes() for system in realization.systems]
-    order = np.repeat(realization.orders, [len(each) for each in modes])
-    shapes = np.hstack([each.shapes for each in modes])
-    length = np.linalg.norm(shapes, axis=0)
-    return Poles(
-        order,
-        np.concatenate([each.frequency_hz for each in modes]),
-        np.concatenate([each.damping_ratio for each in modes]),
-        shapes / np.where(length == 0, 1, length),
-    )
+    parts = [Poles.of(system.modes(), system.n_states) for system in realization.systems]
+    return Poles(*(np.concatenate(columns, axis=-1) for columns in zip(*parts, strict=True)))
 
 
 def _follow(poles: Poles, limits: Thresholds) -> tuple[Indices, Indices]:

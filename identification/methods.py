@@ -1,0 +1,194 @@
+"""All methods by name, and what each is for."""
+
+from __future__ import annotations
+
+import inspect
+from collections.abc import Callable, Iterable
+from dataclasses import dataclass, replace
+from typing import Any
+
+from identification.era import era
+from identification.errors import IdentificationError
+from identification.okid import okid_era
+from identification.pulse import markov_parameters
+from identification.recording import Recording
+from identification.ssi import ssi_cov
+from identification.systems import Realization
+
+
+@dataclass(frozen=True)
+class Method:
+    """One way from a recording to models.
+
+    Attributes:
+        name: as in `METHODS`.
+        function: function(recording, order, *, orders, …) -> Realization. Without `order` and `orders` it
+            realizes all orders that the data may carry, or the one that noise-free data show.
+        needs_inputs: whether forces must be measured.
+        finds_order: whether the singular values show the order, as they do where the response to known forces
+            is realized and the noise is that of the sensors. Otherwise a sweep of the order tells the modes.
+        kinds: kinds of records that it is made for.
+        summary: one line.
+    """
+
+    name: str
+    function: Callable[..., Realization]
+    needs_inputs: bool
+    finds_order: bool
+    kinds: tuple[str, ...]
+    summary: str
+
+    @property
+    def settings(self) -> tuple[str, ...]:
+        """Names of the options."""
+        parameters = inspect.signature(self.function).parameters.values()
+        return tuple(each.name for each in parameters if each.kind is each.KEYWORD_ONLY)
+
+    def __call__(self, recording: Recording, order: int | None = None, **settings: Any) -> Realization:
+        """Models of a recording.
+
+        Raises:
+            IdentificationError: there is no such setting, no measured input, or the data do not suit.
+        """
+        unknown = sorted(set(settings) - set(self.settings))
+        if unknown:
+            raise IdentificationError(
+                f"method {self.name!r} has no setting {unknown[0]!r}; it has {', '.join(self.settings)}"
+            )
+        if self.needs_inputs and not all(record.inputs.shape[0] for record in recording.records):
+            raise IdentificationError(
+                f"method {self.name!r} needs the forces and a record has no inputs; "
+                "take a method for outputs alone, such as ssi_cov"
+            )
+        return self.function(recording, order, **settings)
+
+
+def era_recording(
+    recording: Recording,
+    order: int | None = None,
+    *,
+    orders: Iterable[int] | None = None,
+    form: str = "balanced",
+    n_rows: int | None = None,
+    n_columns: int | None = None,
+) -> Realization:
+    """Models from unit pulses or free decays: `markov_parameters`, then `era` at every order.
+
+    Args:
+        recording: records of kind `pulse` or `free_decay`.
+        order: number of states; chosen from the singular values when None.
+        orders: further orders; when both are None and there is noise, up to twice the order chosen.
+        form: as for `era`.
+        n_rows: as for `era`.
+        n_columns: as for `era`.
+
+    Raises:
+        RecordingError: the records are neither pulses nor free decays.
+        OrderError: an order exceeds the rank of the data.
+
+    Source: Juang and Pappa (1985), J. Guidance 8(5).
+    """
+    markov = markov_parameters(recording)
+
+    def realize(order: int | None, orders: Iterable[int] | None) -> Realization:
+        return era(markov, order, form=form, n_rows=n_rows, n_columns=n_columns, orders=orders)
+
+    return _around_the_order(realize, order, orders)
+
+
+def okid_era_recording(
+    recording: Recording,
+    order: int | None = None,
+    *,
+    orders: Iterable[int] | None = None,
+    observer: int | None = None,
+    n_lags: int | None = None,
+    form: str = "balanced",
+) -> Realization:
+    """Models from recorded inputs and outputs: `okid_era` at every order.
+
+    Args:
+        recording: records with inputs.
+        order: number of states; chosen from the singular values when None.
+        orders: further orders; when both are None and there is noise, up to twice the order chosen.
+        observer: as for `okid_era`.
+        n_lags: as for `okid_era`.
+        form: as for `okid_era`.
+
+    Raises:
+        IdentificationError: as for `okid_era`.
+
+    Source: Juang, Phan, Horta and Longman (1993), J. Guidance 16(2), 320-329.
+    """
+
+    def realize(order: int | None, orders: Iterable[int] | None) -> Realization:
+        return okid_era(recording, order, observer=observer, n_lags=n_lags, form=form, orders=orders)
+
+    return _around_the_order(realize, order, orders)
+
+
+def _around_the_order(
+    realize: Callable[[int | None, Iterable[int] | None], Realization],
+    order: int | None,
+    orders: Iterable[int] | None,
+) -> Realization:
+    """Models of the orders asked for, or of the order that the data show and a sweep around it."""
+    found = realize(order, orders)
+    if order is not None or orders is not None or shows_rank(found):
+        return found
+    highest = min(max(2 * found.order, found.order + 6), found.singular_values.size)
+    swept = realize(found.order, range(2, highest + 1, 2))
+    return replace(swept, notes=(*found.notes, f"Orders 2, 4, … {highest} tell whether its modes stay put."))
+
+
+def shows_rank(realization: Realization) -> bool:
+    """Whether the data are calculated ones, whose singular values end in rounding errors after the order.
+
+    The best converters resolve 24 bits, 6e-8 of their range; nothing measured falls by a factor of 1000 to
+    below 1e-8.
+    """
+    s, n = realization.singular_values, realization.order
+    return bool(n < s.size and s[n] <= 1e-8 * s[0] and s[n - 1] >= 1e3 * s[n])
+
+
+METHODS = {
+    method.name: method
+    for method in (
+        Method(
+            name="era",
+            function=era_recording,
+            needs_inputs=False,
+            finds_order=True,
+            kinds=("pulse", "free_decay"),
+            summary="Eigensystem realization, from the response to unit pulses or from free decays.",
+        ),
+        Method(
+            name="okid_era",
+            function=okid_era_recording,
+            needs_inputs=True,
+            finds_order=True,
+            kinds=("impact", "random", "burst_random", "sweep", "multisine", "other"),
+            summary="Observer and eigensystem realization, from any forces and the response to them.",
+        ),
+        Method(
+            name="ssi_cov",
+            function=ssi_cov,
+            needs_inputs=False,
+            finds_order=False,
+            kinds=("ambient", "random", "burst_random", "sweep", "multisine", "other"),
+            summary="Stochastic subspace identification, from the covariances of the outputs alone.",
+        ),
+    )
+}
+"""Name -> method."""
+
+
+def find_method(name: str) -> Method:
+    """The method of that name.
+
+    Raises:
+        IdentificationError: there is none.
+    """
+    if name not in METHODS:
+        raise IdentificationError(f"method {name!r} does not exist; there are {', '.join(METHODS)}")
+    return METHODS[name]
