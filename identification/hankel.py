@@ -96,11 +96,11 @@ def choose_order(P: Array, S: Array, Q: Array, *, n_outputs: int, n_inputs: int)
     """The number of states that the singular values of a Hankel matrix show, and the reason in one sentence.
 
     Calculated data fall off a cliff: the last fall by a factor of 1000 or more to below 1e-8 of the
-    largest value ends the signal. Measured data end in a floor of noise. What is left beyond an order
-    n, taken for noise with a variance of its own in each output and each input, has no singular value
-    much above the root of the largest mean square of a row plus that of a column. The order is the
-    first one whose next value is within 1.5 times that edge (the margin covers the repetition of
-    entries in a Hankel matrix), made even as an oscillation takes two states.
+    largest value ends the signal. Measured data end in a floor of noise. If what lies beyond an order
+    were noise, with a variance of its own in each output and each input, its singular values would
+    not reach much above the root of the largest mean square of a row plus that of a column. The order
+    is the last one whose own value exceeds 1.5 times that edge (the repetition of entries in a Hankel
+    matrix takes up to 1.2), made even as an oscillation takes two states.
 
     Args:
         P: left singular vectors in columns, shape (n_rows * n_outputs, n_values).
@@ -123,25 +123,24 @@ def choose_order(P: Array, S: Array, Q: Array, *, n_outputs: int, n_inputs: int)
     if cliffs.size:
         order = int(cliffs[-1]) + 1
         return order, (
-            f"order {order} is where the singular values fall from {s[order - 1] / s[0]:.1e} to "
-            f"{s[order] / s[0]:.1e} of the largest"
+            f"Order {order} is where the singular values fall from {s[order - 1] / s[0]:.1e} to "
+            f"{s[order] / s[0]:.1e} of the largest."
         )
     n = np.arange(s.size // 2 + 1)
     share = rows * columns / ((rows - n) * (columns - n))  # the singular vectors kept took noise with them
     row = share * _largest_mean_square(P, s, n_outputs)[n]
     column = share * _largest_mean_square(Q, s, n_inputs)[n]
     edge = 1.5 * (np.sqrt(row) + np.sqrt(column))
-    below = np.flatnonzero(s[n] <= edge)
-    if not below.size:
-        order = max(2 * int(n[-1] // 2), 1)
-        return order, f"order {order}: no edge of noise in sight, so the Hankel matrix may be too small"
-    last = int(below[0])
-    if last == 0:
-        return 2, "order 2: no singular value stands above the noise, so the data hardly show an oscillation"
+    above = np.flatnonzero(s[n[1:] - 1] > edge[1:])
+    if not above.size:
+        return 2, "Order 2: no singular value stands above the noise, so the data hardly show an oscillation."
+    last = int(above[-1]) + 1
+    if last == n[-1]:
+        return last, f"Order {last}: no edge of noise is in sight, so the Hankel matrix may be too small."
     order = min(last + last % 2, s.size)
     return order, (
-        f"order {order}: singular value {last} is the last above the edge of the noise, "
-        f"{edge[last] / s[0]:.1e} of the largest"
+        f"Order {order}: singular value {last} is the last above the edge of the noise, "
+        f"{edge[last] / s[0]:.1e} of the largest."
     )
 
 

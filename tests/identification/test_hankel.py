@@ -86,7 +86,7 @@ def test_order_of_calculated_data_is_exact(model, order):
     P, S, Qt = subspace(model, 60)
     chosen, reason = choose_order(P, S, Qt.T, n_outputs=len(model.outputs), n_inputs=len(model.inputs))
     assert chosen == order
-    assert f"order {order} is where the singular values fall" in reason
+    assert f"Order {order} is where the singular values fall" in reason
 
 
 @pytest.mark.parametrize("level", [0.01, 0.05, 0.2])
