@@ -110,7 +110,7 @@ def _stays_put(modes: Modes, stabilization: Stabilization | None) -> tuple[bool,
         return (False,) * len(modes)
     apart = difference(Poles.of(modes), Poles.of(stabilization.modes), Thresholds())
     same = (apart.frequency <= 1) & (apart.shape <= 1) & (apart.damping <= 1)
-    return tuple(bool(found) for found in same.any(axis=1))
+    return tuple(bool(found) for found in np.atleast_1d(np.any(same, axis=1)))
 
 
 def _lowest_complete(
