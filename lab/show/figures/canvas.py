@@ -13,6 +13,7 @@ import matplotlib
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
+from matplotlib.font_manager import findfont, get_font
 from matplotlib.ticker import FuncFormatter, MaxNLocator
 
 WIDTH = 6.7
@@ -40,6 +41,9 @@ LOOK: Any = {
     "legend.frameon": False,
     "path.simplify_threshold": 0.2,
 }
+
+
+REPLACEMENT = "\N{REPLACEMENT CHARACTER}"
 
 
 @dataclass(frozen=True)
@@ -79,6 +83,8 @@ def clean(text: str, name: str, title: str) -> str:
         for key, value in list(element.attrib.items()):
             del element.attrib[key]
             element.set(key.rpartition("}")[2], _attribute(element.tag, key, value, name))
+    for element in root.iter():
+        element.text = None if element.text is None else _restored(element.text)
     root.attrib = {
         "viewBox": root.get("viewBox", ""),
         "role": "img",
@@ -101,10 +107,33 @@ def _attribute(tag: str, key: str, value: str, name: str) -> str:
     return value
 
 
-def plain(text: str) -> str:
-    """Text that matplotlib draws as it is: no formula, no character that SVG forbids."""
-    visible = "".join(c if c.isprintable() else "\N{REPLACEMENT CHARACTER}" for c in text)
-    return visible.replace("$", r"\$")
+def plain(text: str, longest: int = 30) -> str:
+    """Text that matplotlib draws as it is, cut in the middle when longer: no formula, no forbidden character."""
+    if len(text) > longest:
+        text = f"{text[: longest // 2]}…{text[len(text) - (longest - 1) // 2 :]}"
+    visible = "".join(c if c.isprintable() else REPLACEMENT for c in text)
+    return "".join(c if _drawable(c) else _stand_in(c) for c in visible).replace("$", r"\$")
+
+
+def _drawable(character: str) -> bool:
+    """Whether the drawing font has the character and it stands for itself."""
+    if character.isascii():
+        return True
+    font = get_font(findfont(LOOK["font.family"][0]))
+    return not 0x2800 <= ord(character) < 0x2900 and font.get_char_index(ord(character)) != 0
+
+
+def _stand_in(character: str) -> str:
+    """Two Braille patterns in place of a character that only the reader's browser can draw; about as wide."""
+    code = ord(character) if ord(character) < 0x10000 else ord(REPLACEMENT)
+    return chr(0x2800 + code // 256) + chr(0x2800 + code % 256)
+
+
+def _restored(text: str) -> str:
+    """Text with the characters that had stand-ins."""
+    return re.sub(
+        "[\u2800-\u28ff]{2}", lambda m: chr(256 * (ord(m[0][0]) - 0x2800) + ord(m[0][1]) - 0x2800), text
+    )
 
 
 def power_of_ten(value: float, _: int | None = None) -> str:

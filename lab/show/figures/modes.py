@@ -50,7 +50,7 @@ def mode_shapes(result: Result) -> Drawing | None:
             axes.set_yticks([-1, 0, 1])
         bottom = frames[-1]
         if n_points <= MAX_NAMED:
-            names = [plain(label) for label in table.labels]
+            names = [plain(label, 16) for label in table.labels]
             bottom[0].set_xticks(range(1, n_points + 1), names, rotation=90)
             for axes in bottom[1:]:
                 axes.tick_params(axis="x", labelrotation=90)
@@ -66,7 +66,8 @@ def mode_shapes(result: Result) -> Drawing | None:
         caption += (
             f" 1 is {table.labels[0]}, {n_points} is {table.labels[-1]}, in the order of the recording."
         )
-    return drawing("shapes", 0.5 + 1.35 * n_rows, caption, paint)
+    longest = min(16, max(len(label) for label in table.labels))
+    return drawing("shapes", 0.4 + 0.06 * longest + 1.3 * n_rows, caption, paint)
 
 
 def _stems(axes: Axes, shape: np.ndarray, truth: np.ndarray) -> None:

@@ -46,7 +46,7 @@ def time_histories(recording: Recording) -> Drawing:
                 if start:
                     axes.axvline(start, color="0.5", linestyle=":", linewidth=0.8)
             axes.set_ylabel(
-                f"{plain(channel.name)}\n[{_upright(channel.unit)}]", rotation=0, ha="right", va="center"
+                f"{plain(channel.name, 16)}\n[{_upright(channel.unit)}]", rotation=0, ha="right", va="center"
             )
             few_ticks(axes, 2)
         frames[-1].set_xlabel("time [s]")
@@ -110,7 +110,7 @@ def _densities(axes: Axes, frequency: np.ndarray, density: np.ndarray, names: Se
     positive = np.where(density > 0, density, np.nan)
     if len(names) <= MAX_LINES:
         for i, name in enumerate(names):
-            axes.plot(frequency, positive[i], color=SERIES[i], linestyle=DASHES[i], label=plain(name))
+            axes.plot(frequency, positive[i], color=SERIES[i], linestyle=DASHES[i], label=plain(name, 20))
         axes.legend(loc="center left", bbox_to_anchor=(1.0, 0.5))
     else:
         axes.plot(frequency, positive.T, color="0.7", linewidth=0.5)
@@ -145,7 +145,7 @@ def responses(recording: Recording, spectrum: Spectra, result: Result) -> Drawin
                 _response(upper, lower, fine, model, "identified", IDENTIFIED)
             logarithmic(upper)
             unit = f"{_upright(recording.outputs[i].unit)} / {_upright(recording.inputs[j].unit)}"
-            upper.set_title(plain(f"{recording.outputs[i].name} / {recording.inputs[j].name}"))
+            upper.set_title(f"{plain(recording.outputs[i].name, 20)} / {plain(recording.inputs[j].name, 20)}")
             upper.set_ylabel(f"[{unit}]")
             lower.set_ylabel("phase [°]")
             lower.set_ylim(-190, 190)

@@ -15,8 +15,8 @@ TEXT = (225, 225, 225)
 
 
 def log_axes(stream: rr.RecordingStream, origin: str, axes: Axes) -> None:
-    """Logs frame and ticks; what the axes are is for the name of the view to say."""
-    stream.log(f"{origin}/axes", rr.LineStrips2D(axes.frame(), colors=AXIS, radii=-0.75), static=True)
+    """Logs frame and ticks at `origin`; what the axes are is for the name of the view to say."""
+    stream.log(origin, rr.LineStrips2D(axes.frame(), colors=AXIS, radii=-0.75), static=True)
     points, texts = axes.tick_labels()
     log_texts(stream, f"{origin}/ticks", points, texts)
 
