@@ -49,7 +49,7 @@ def listing(kind: str) -> dict[str, str]:
     if kind == "methods":
         from identification.methods import METHODS
 
-        return {name: _first_sentence(method.__doc__ or "") for name, method in METHODS.items()}
+        return {name: method.summary for name, method in METHODS.items()}
     from lab.effects import EFFECTS
 
     return {name: _first_sentence(effect.__doc__ or "") for name, effect in EFFECTS.items()}

@@ -49,21 +49,22 @@ def present(
         recording,
         scenario_text=scenario.text if scenario else "",
         command=command,
-        facts=_facts(recording, rig),
+        facts=_facts(recording, rig, scenario),
     )
     moved = _first_swings(rig, scenario) if rig and scenario else None
     write_rrd(folder / "run.rrd", result, recording, rig=rig, motion=moved)
 
 
-def _facts(recording: Recording, rig: Rig | None) -> dict[str, str]:
+def _facts(recording: Recording, rig: Rig | None, scenario: Scenario | None) -> dict[str, str]:
+    """What it takes to repeat the test, besides what the report knows by itself."""
     facts = {
-        "Records": f"{len(recording.records)}, together {recording.duration:g} s",
-        "Sample rate": f"{recording.sample_rate:g} Hz",
         "Inputs": ", ".join(channel.name for channel in recording.inputs) or "none",
         "Outputs": ", ".join(channel.name for channel in recording.outputs),
     }
     if rig is not None:
-        facts["Model"] = f"{rig.name}: {', '.join(rig.dofs)}"
+        facts["Model"] = f"{rig.name}, degrees of freedom {', '.join(rig.dofs)}"
+    if scenario is not None:
+        facts["Seed"] = str(scenario.seed)
     for name, value in recording.attributes.items():
         facts[name.replace("_", " ").capitalize()] = value if isinstance(value, str) else f"{value:g}"
     return facts

@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import replace
-from functools import partial
+from functools import cache
 from pathlib import Path
 from typing import Any
 
@@ -14,6 +14,7 @@ from identification.identify import identify
 from identification.recording import Recording
 from lab.compare import compare
 from lab.criteria import judge
+from lab.errors import RigError
 from lab.excitation import Sampling
 from lab.files.folder import output_folder
 from lab.files.recording import load
@@ -55,7 +56,7 @@ def run(
         _record(folder / "recording.h5", rig, scenario, progress)
         recording = load(folder / "recording.h5")
         chosen = scenario.identification
-        result = examine(recording, chosen.method, order=chosen.order, **chosen.settings)
+        result = examine(recording, chosen.method, order=chosen.order, dofs=touched(rig), **chosen.settings)
         result = replace(held_against(rig, result, scenario), title=scenario.title)
         present(folder, result, recording, scenario=scenario, rig=rig, command=command)
     return result
@@ -94,7 +95,11 @@ def identify_file(
 
 def rig_of(scenario: Scenario) -> Rig:
     """The rig that a scenario describes, its instruments on and its channels connected."""
-    rig = Rig.load(scenario.model_file())
+    path = scenario.model_file()
+    try:
+        rig = Rig.load(path)
+    except RigError as error:
+        raise RigError(f"{error} (in {path})") from None
     wanted = scenario.channels
     # An axis across all motion would only record rounding errors.
     outputs = rig.responding if wanted.outputs is None else wanted.outputs
@@ -103,15 +108,33 @@ def rig_of(scenario: Scenario) -> Rig:
     return instrument(rig, **instruments, sample_rate=scenario.test.sample_rate) if instruments else rig
 
 
+def touched(rig: Rig) -> list[str]:
+    """Degrees of freedom that a channel reads or drives, in model order."""
+    named = {channel.dof for channel in (*rig.inputs, *rig.outputs)}
+    return [dof for dof in rig.dofs if dof in named]
+
+
 def examine(
-    recording: Recording, method: str | None = None, *, order: int | None = None, **settings: Any
+    recording: Recording,
+    method: str | None = None,
+    *,
+    order: int | None = None,
+    dofs: Sequence[str] | None = None,
+    **settings: Any,
 ) -> Result:
     """The result of identifying a recording, without any truth beside it.
+
+    Args:
+        recording: complete, in SI units.
+        method: name, as in `lab list methods`; chosen from the data when None.
+        order: number of states; chosen from the data when None.
+        dofs: names of the degrees of freedom of M, C, K, in the order wanted.
+        settings: further settings of the method.
 
     Raises:
         IdentificationError: the recording or the request is at fault.
     """
-    found = identify(recording, method, order=order, **settings)
+    found = identify(recording, method, order=order, dofs=dofs, **settings)
     return Result(
         title=recording.title,
         sample_rate=recording.sample_rate,
@@ -140,11 +163,13 @@ def held_against(rig: Rig, result: Result, scenario: Scenario) -> Result:
 
 def _record(path: Path, rig: Rig, scenario: Scenario, progress: Progress | None) -> None:
     drive, test = scenario.drive(), scenario.test
-    told = None
-    if progress is not None:
+
+    @cache
+    def total() -> int:
         sampling = Sampling(test.sample_rate, round(test.duration * test.sample_rate))
         one_run = drive.loads(rig, sampling, np.random.default_rng(scenario.seed))
-        told = partial(progress, total=test.runs * sum(load.n_samples for load in one_run))
+        return test.runs * sum(load.n_samples for load in one_run)
+
     simulate_to_file(
         path,
         rig,
@@ -154,5 +179,5 @@ def _record(path: Path, rig: Rig, scenario: Scenario, progress: Progress | None)
         n_runs=test.runs,
         seed=scenario.seed,
         accuracy=test.accuracy,
-        progress=told,
+        progress=(lambda n: progress(n, total=total())) if progress else None,
     )

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import textwrap
+
 import numpy as np
 
 from identification.recording import Array
@@ -12,12 +14,14 @@ MAX_DOFS = 8
 """Matrices up to this size are printed entry by entry."""
 
 MAX_MODES = 20
+WIDTH = 100
 
 
 def summary(result: Result) -> str:
     """Matrices with their errors, modes beside the true ones, criteria and warnings, as lines of text."""
     parts = [_headline(result), _matrices(result), _modes(result), _criteria(result)]
-    parts += [f"warning: {warning}" for warning in result.warnings]
+    parts += [textwrap.fill(" ".join(result.notes), WIDTH)]
+    parts += ["\n".join(textwrap.fill(f"warning: {each}", WIDTH) for each in result.warnings)]
     return "\n\n".join(part for part in parts if part)
 
 
@@ -48,8 +52,10 @@ def _rows(matrix: Array, estimate: SecondOrder) -> list[str]:
     # Entries below the printed digits of the largest one are rounding, not information.
     shown = np.where(np.abs(matrix) < 1e-10 * np.max(np.abs(matrix)), 0.0, matrix)
     width = max(len(dof) for dof in estimate.dofs)
+    # Ten digits where a screen has room for them.
+    form = ">14.11g" if len(estimate.dofs) <= 5 else ">10.5g"
     return [
-        f"  {dof:<{width}}" + "".join(f" {value:>17.11g}" for value in row)
+        f"  {dof:<{width}}" + "".join(f" {value:{form}}" for value in row)
         for dof, row in zip(estimate.dofs, shown, strict=True)
     ]
 
