@@ -9,7 +9,7 @@ import numpy as np
 import scipy.linalg
 
 from identification.errors import IdentificationError, OrderError, TooShortError
-from identification.hankel import block_hankel, choose_order
+from identification.hankel import block_hankel, choose_order, numerical_rank
 from identification.recording import Array
 from identification.systems import MarkovParameters, Realization, StateSpace
 
@@ -232,7 +232,7 @@ def settle_orders(
         notes = (note,)
     singular_values, shape = H.S, H.H0.shape
     wanted = sorted({order, *(orders or ())})
-    rank = int(np.sum(singular_values > np.finfo(float).eps * max(shape) * singular_values[0]))
+    rank = numerical_rank(singular_values, shape)
     if wanted[0] < 1 or wanted[-1] > rank:
         wrong = wanted[0] if wanted[0] < 1 else wanted[-1]
         raise OrderError(

@@ -92,6 +92,13 @@ def shift_invariance(
     return systems
 
 
+def numerical_rank(singular_values: Array, shape: tuple[int, int]) -> int:
+    """How many singular values of a matrix of that shape, largest first, stand above rounding."""
+    return int(
+        np.sum(singular_values > np.finfo(float).eps * max(shape) * np.max(singular_values, initial=0.0))
+    )
+
+
 def choose_order(P: Array, S: Array, Q: Array, *, n_outputs: int, n_inputs: int) -> tuple[int, str]:
     """The number of states that the singular values of a Hankel matrix show, and the reason in one sentence.
 
