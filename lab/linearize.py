@@ -1,98 +1,44 @@
 """Truth of a structure: what MuJoCo's equations come to for small motion about an operating point.
 
 Two independent ways: assembly from the springs, dampers and masses of a model that is linear as written, and central
-differences of MuJoCo's forces and accelerations for any other.
+differences of MuJoCo's forces and accelerations for any other. Models come without kinks here, see `lab.tangent`.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable
+import copy
+from collections.abc import Callable, Sequence
 
 import mujoco
 import numpy as np
-import scipy.linalg
 
 from identification.recording import Array
 from lab.errors import RigError
 
 DIFFERENCE_STEP = 1e-3
-"""Step of the extrapolated central differences, relative to the model's extent: truncation and rounding both near 1e-12."""
-
-
-def is_smooth(model: mujoco.MjModel) -> bool:
-    """Whether no force has a kink: no deadband, dry friction, limit, contact or plastic spring."""
-    m = model
-    contacts = (
-        not m.opt.disableflags & int(mujoco.mjtDisableBit.mjDSBL_CONTACT)
-        and np.any((m.geom_contype != 0) | (m.geom_conaffinity != 0))
-        and m.ngeom > 1
-    )
-    kinked = (
-        np.any(m.tendon_lengthspring[:, 0] != m.tendon_lengthspring[:, 1]),
-        np.any(m.dof_frictionloss),
-        np.any(m.tendon_frictionloss),
-        np.any(m.jnt_limited),
-        np.any(m.tendon_limited),
-        np.any(m.tendon_springyield),
-        np.any(m.actuator_ctrllimited),
-        np.any(m.actuator_forcelimited),
-        contacts,
-    )
-    return not any(kinked)
-
-
-def is_linear(model: mujoco.MjModel) -> bool:
-    """Whether forces are linear in position, velocity and control at any amplitude."""
-    m = model
-    fixed_tendons = all(
-        m.wrap_type[m.tendon_adr[i] : m.tendon_adr[i] + m.tendon_num[i]].max()
-        == int(mujoco.mjtWrap.mjWRAP_JOINT)
-        and m.wrap_type[m.tendon_adr[i] : m.tendon_adr[i] + m.tendon_num[i]].min()
-        == int(mujoco.mjtWrap.mjWRAP_JOINT)
-        for i in range(m.ntendon)
-    )
-    straight = (int(mujoco.mjtTrn.mjTRN_JOINT), int(mujoco.mjtTrn.mjTRN_TENDON))
-    dynamics = (
-        int(mujoco.mjtDyn.mjDYN_NONE),
-        int(mujoco.mjtDyn.mjDYN_FILTER),
-        int(mujoco.mjtDyn.mjDYN_INTEGRATOR),
-    )
-    bends = (
-        np.any(m.jnt_type != int(mujoco.mjtJoint.mjJNT_SLIDE)),
-        not fixed_tendons,
-        np.any(m.jnt_stiffnesspoly),
-        np.any(m.dof_dampingpoly),
-        np.any(m.tendon_stiffnesspoly),
-        np.any(m.tendon_dampingpoly),
-        np.any(m.actuator_dampingpoly),
-        not np.all(np.isin(m.actuator_trntype, straight)),
-        np.any(m.actuator_gaintype != int(mujoco.mjtGain.mjGAIN_FIXED)),
-        np.any(m.actuator_biastype > int(mujoco.mjtBias.mjBIAS_AFFINE)),
-        not np.all(np.isin(m.actuator_dyntype, dynamics)),
-        m.opt.density or m.opt.viscosity,
-        m.neq,
-    )
-    return is_smooth(model) and not any(bends)
+"""Step of the extrapolated central differences, of the model's extent or in radians: truncation and rounding near 1e-12."""
 
 
 def equilibrium(model: mujoco.MjModel) -> Array:
     """Joint positions at which the structure stands still at zero control, found by Newton's method from `qpos0`.
 
+    Dry friction, which could hold it anywhere near, is left out.
+
     Raises:
         RigError: there is no such position near the reference position.
     """
-    m, data = model, mujoco.MjData(model)
+    m = copy.copy(model)
+    m.opt.disableflags |= int(mujoco.mjtDisableBit.mjDSBL_FRICTIONLOSS)
+    data = mujoco.MjData(m)
     position = m.qpos0.copy()
     force = _static_force(m, data, position)
     scale = _force_scale(m)
     if np.max(np.abs(force)) <= 1e-14 * scale:
         return position
     for _ in range(50):
-        K = -_jacobian(lambda q: _static_force(m, data, q), position, DIFFERENCE_STEP * m.stat.extent)
-        try:
-            step = scipy.linalg.solve(K, force)
-        except (scipy.linalg.LinAlgError, scipy.linalg.LinAlgWarning):
-            break
+        K = -differences(lambda q: _static_force(m, data, q), position, motion_steps(m))
+        # A structure that can float in some direction stays where it is in that direction.
+        step = np.linalg.lstsq(K, force, rcond=1e-10)[0]
         for halvings in range(30):
             trial = position + step * 0.5**halvings
             trial_force = _static_force(m, data, trial)
@@ -163,8 +109,8 @@ def _differenced(model: mujoco.MjModel, data: mujoco.MjData, position: Array) ->
         mujoco.mj_forward(m, data)
         return np.asarray(data.qfrc_passive + data.qfrc_actuator - data.qfrc_bias)
 
-    K = -_jacobian(lambda q: force(q, zero), position, DIFFERENCE_STEP * m.stat.extent)
-    C_d = -_jacobian(lambda v: force(position, v), zero, DIFFERENCE_STEP * m.stat.extent)
+    K = -differences(lambda q: force(q, zero), position, motion_steps(m))
+    C_d = -differences(lambda v: force(position, v), zero, motion_steps(m))
     return C_d, K
 
 
@@ -188,15 +134,37 @@ def state_space(model: mujoco.MjModel, position: Array, *, exact: bool) -> tuple
         mujoco.mj_forward(m, data)
         return np.concatenate([data.qvel, data.qacc, data.act_dot, data.sensordata])
 
-    if exact:
-        J = _jacobian(response, center, 1.0, extrapolate=False)
-    else:
-        J = _jacobian(response, center, DIFFERENCE_STEP * m.stat.extent)
-    # Differences of a reading that does not depend on a state leave rounding: it is zero.
-    floor = 1e-14 if exact else 1e-11
-    J[np.abs(J) < floor * np.max(np.abs(J), axis=1, keepdims=True, initial=1e-300)] = 0.0
+    # The response is linear in controls and forces in any case: a large force drowns rounding.
+    force = np.full(m.na + m.nu + n, max(1.0, _force_scale(m)))
+    steps = np.ones(center.size) if exact else np.concatenate([motion_steps(m), motion_steps(m), force])
+    J = differences(response, center, steps, extrapolate=not exact)
     states = 2 * n + m.na
+    rows = [*range(states), *(states + m.sensor_adr)]
+    _drop_rounding(J, rows, ends, 1e-14 if exact else 1e-11, np.abs(response(center)) / np.min(steps))
     return J[:states, :states], J[:states, states:], J[states:, :states], J[states:, states:]
+
+
+def _drop_rounding(J: Array, rows: Sequence[int], columns: Array, floor: float, offset: Array) -> None:
+    """Sets to zero what differences leave of a reading that does not depend on a kind of variable.
+
+    Args:
+        J: shape (n_readings, n_variables).
+        rows: first row of each state or sensor; the axes of a sensor share a scale.
+        columns: last column but one of each kind of variable, since kinds differ in unit.
+        floor: relative to the largest entry of a block.
+        offset: constant part of each reading over the step, whose rounding is in the difference.
+    """
+    for sensor, constant in zip(np.split(J, rows[1:]), np.split(offset, rows[1:]), strict=True):
+        for block in np.split(sensor, columns, axis=1):
+            if block.size:
+                noise = max(floor * np.max(np.abs(block)), 1e-15 * np.max(constant))
+                block[np.abs(block) < noise] = 0.0
+
+
+def motion_steps(model: mujoco.MjModel) -> Array:
+    """Steps for differences in the position or velocity of every joint, shape (n_dofs,) [m or rad, and per s]."""
+    hinge = model.jnt_type == int(mujoco.mjtJoint.mjJNT_HINGE)
+    return DIFFERENCE_STEP * np.where(hinge, 1.0, model.stat.extent)
 
 
 def _static_force(model: mujoco.MjModel, data: mujoco.MjData, position: Array) -> Array:
@@ -212,15 +180,15 @@ def _force_scale(model: mujoco.MjModel) -> float:
     return max(weight, 1e-3 * stiffest * model.stat.extent, 1e-12)
 
 
-def _jacobian(
-    function: Callable[[Array], Array], point: Array, step: float, *, extrapolate: bool = True
+def differences(
+    function: Callable[[Array], Array], point: Array, steps: Array, *, extrapolate: bool = True
 ) -> Array:
     """Central differences, shape (n_values, n_point); extrapolated over two steps to fourth order."""
     columns = []
-    for direction in np.eye(point.size):
+    for direction, h in zip(np.eye(point.size), steps, strict=True):
 
         def slope(h: float, direction: Array = direction) -> Array:
             return np.asarray((function(point + h * direction) - function(point - h * direction)) / (2 * h))
 
-        columns.append((4 * slope(step / 2) - slope(step)) / 3 if extrapolate else slope(step))
-    return np.stack(columns, axis=1) if columns else np.zeros((0, 0))
+        columns.append((4 * slope(h / 2) - slope(h)) / 3 if extrapolate else slope(h))
+    return np.stack(columns, axis=1)

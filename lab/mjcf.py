@@ -6,6 +6,8 @@ MuJoCo's own XML writer rounds numbers to six digits, so a rig keeps and edits t
 from __future__ import annotations
 
 import xml.etree.ElementTree as ET
+from collections.abc import Iterator
+from contextlib import contextmanager
 from pathlib import Path
 
 import mujoco
@@ -17,11 +19,11 @@ def read(path: Path) -> str:
     """The MJCF file as one text, with its includes put in place.
 
     Raises:
-        FileError: the file cannot be read.
-        RigError: it is no XML.
+        FileError: the file, or one that it includes, cannot be read.
+        RigError: it is no XML, or includes a file twice.
     """
     root = parse(_text(path), str(path))
-    _expand_includes(root, path.parent, (path.resolve(),))
+    _expand_includes(root, path.parent, {path.resolve()})
     return to_text(root)
 
 
@@ -55,14 +57,27 @@ def compiled(xml: str, folder: Path | None, source: str) -> mujoco.MjModel:
     Raises:
         RigError: MuJoCo refuses it; MuJoCo's reason in one line.
     """
+    with quiet():
+        try:
+            spec = mujoco.MjSpec.from_string(xml)
+            if folder is not None:
+                spec.modelfiledir = str(folder)
+            return spec.compile()
+        except (ValueError, OSError) as error:
+            reason = " ".join(str(error).split())
+            raise RigError(f"MuJoCo refuses {source}: {reason}") from None
+
+
+@contextmanager
+def quiet() -> Iterator[list[str]]:
+    """Collects MuJoCo's warnings, which it would write to a log file in the working directory."""
+    complaints: list[str] = []
+    before = mujoco.get_mju_user_warning()
+    mujoco.set_mju_user_warning(complaints.append)
     try:
-        spec = mujoco.MjSpec.from_string(xml)
-        if folder is not None:
-            spec.modelfiledir = str(folder)
-        return spec.compile()
-    except (ValueError, OSError) as error:
-        reason = " ".join(str(error).split())
-        raise RigError(f"MuJoCo refuses {source}: {reason}") from None
+        yield complaints
+    finally:
+        mujoco.set_mju_user_warning(before)
 
 
 def number(value: float) -> str:
@@ -72,7 +87,7 @@ def number(value: float) -> str:
 
 def _text(path: Path) -> str:
     try:
-        return path.read_text(encoding="utf-8")
+        return path.read_text(encoding="utf-8-sig")
     except FileNotFoundError:
         raise FileError(
             f"model file {path} does not exist; expected the path of an MJCF (.xml) file"
@@ -81,18 +96,23 @@ def _text(path: Path) -> str:
         raise FileError(f"model file {path} cannot be read ({error}); expected an MJCF (.xml) file") from None
 
 
-def _expand_includes(element: ET.Element, folder: Path, open_files: tuple[Path, ...]) -> None:
+def _expand_includes(element: ET.Element, folder: Path, read_files: set[Path]) -> None:
+    """Puts included files in place; as in MuJoCo, paths are seen from the main file, and a file is included once."""
     for position, child in reversed(list(enumerate(element))):
-        if child.tag == "include":
-            path = (folder / child.get("file", "")).resolve()
-            if path in open_files:
-                raise RigError(
-                    f"{open_files[-1].name} includes {path.name}, which is open already; remove the circle"
-                )
-            included = parse(_text(path), str(path))
-            _expand_includes(included, folder, (*open_files, path))
-            element.remove(child)
-            for part in reversed(list(included)):
-                element.insert(position, part)
-        else:
-            _expand_includes(child, folder, open_files)
+        if child.tag != "include":
+            _expand_includes(child, folder, read_files)
+            continue
+        name = child.get("file")
+        if not name:
+            raise RigError('an <include> names no file; expected <include file="…"/>')
+        path = (folder / name).resolve()
+        if path in read_files:
+            raise RigError(
+                f"{name} is included a second time; MuJoCo allows it once, so remove one or the circle"
+            )
+        read_files.add(path)
+        included = parse(_text(path), str(path))
+        _expand_includes(included, folder, read_files)
+        element.remove(child)
+        for part in reversed(list(included)):
+            element.insert(position, part)

@@ -10,6 +10,7 @@ import numpy as np
 
 from identification.recording import Array, Channel
 from lab.errors import RigError, UnknownNameError
+from lab.linearize import differences, motion_steps
 
 S = mujoco.mjtSensor
 UNITS = {
@@ -62,15 +63,15 @@ class Ports:
         return _pick(self.outputs, names, "output")
 
 
-def find(model: mujoco.MjModel, position: Array, *, exact: bool) -> Ports:
-    """The channels of a model about the joint positions given; `exact` where its geometry is linear.
+def find(model: mujoco.MjModel, position: Array) -> Ports:
+    """The channels of a model about the joint positions given.
 
     Raises:
         RigError: two channels share a name.
     """
     names = [name_of(model, "joint", i) for i in range(model.njnt)]
     inputs = [_input(model, i, column, names) for i, column in enumerate(_force_columns(model, position).T)]
-    jacobians = _sensor_jacobians(model, position, step=1.0 if exact else 1e-5)
+    jacobians = _sensor_jacobians(model, position)
     outputs, rows = [], []
     for i in range(model.nsensor):
         unit = _unit(model, i)
@@ -173,13 +174,12 @@ def _gain(model: mujoco.MjModel, actuator: int, data: mujoco.MjData) -> float:
     )
 
 
-def _sensor_jacobians(model: mujoco.MjModel, position: Array, *, step: float) -> tuple[Array, Array, Array]:
+def _sensor_jacobians(model: mujoco.MjModel, position: Array) -> tuple[Array, Array, Array]:
     """Readings per unit of position, velocity and acceleration of each joint, each (n_sensordata, n_dofs)."""
-    data = mujoco.MjData(model)
-    n = model.nv
+    data, still = mujoco.MjData(model), np.zeros(model.nv)
 
     def readings(q: Array, v: Array, a: Array) -> Array:
-        data.qpos[:], data.qvel[:] = position + q, v
+        data.qpos[:], data.qvel[:] = q, v
         mujoco.mj_fwdPosition(model, data)
         mujoco.mj_sensorPos(model, data)
         mujoco.mj_fwdVelocity(model, data)
@@ -189,14 +189,10 @@ def _sensor_jacobians(model: mujoco.MjModel, position: Array, *, step: float) ->
         mujoco.mj_sensorAcc(model, data)
         return data.sensordata.copy()
 
-    zero = np.zeros(n)
-    jacobians = []
-    for slot, size in ((0, step), (1, 1.0), (2, 1.0)):
-        J = np.zeros((model.nsensordata, n))
-        for j in range(n):
-            plus, minus = [zero, zero, zero], [zero, zero, zero]
-            plus[slot] = size * np.eye(n)[j]
-            minus[slot] = -plus[slot]
-            J[:, j] = (readings(*plus) - readings(*minus)) / (2 * size)
-        jacobians.append(J)
-    return tuple(jacobians)  # type: ignore[return-value]
+    # Readings of velocity and acceleration are linear in them, so that any step is exact.
+    ones = np.ones(model.nv)
+    return (
+        differences(lambda q: readings(q, still, still), position, motion_steps(model)),
+        differences(lambda v: readings(position, v, still), still, ones, extrapolate=False),
+        differences(lambda a: readings(position, still, a), still, ones, extrapolate=False),
+    )

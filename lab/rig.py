@@ -19,7 +19,7 @@ import numpy as np
 from identification.modes import Modes
 from identification.recording import Array, Channel
 from identification.systems import SecondOrder, StateSpace
-from lab import linearize, mjcf, ports
+from lab import linearize, mjcf, ports, tangent
 from lab.chain import Chain
 from lab.errors import FileError, RigError, UnknownNameError
 
@@ -187,7 +187,7 @@ class Rig:
 
     @cached_property
     def _ports(self) -> ports.Ports:
-        return ports.find(self.model, self.operating_point, exact=self.linear)
+        return ports.find(self._tangent, self.operating_point)
 
     @cached_property
     def inputs(self) -> tuple[Channel, ...]:
@@ -215,15 +215,23 @@ class Rig:
     @cached_property
     def linear(self) -> bool:
         """Whether the structure is linear as written, for motion of any size."""
-        return linearize.is_linear(self.model)
+        return self.smooth and self._straight
 
     @cached_property
     def smooth(self) -> bool:
-        """Whether the structure's forces have no kinks (deadbands, dry friction, limits, contacts)."""
-        return linearize.is_smooth(self.model)
+        """Whether the structure has no kinks (deadbands, dry friction, limits, contacts, clipped signals)."""
+        return tangent.is_smooth(self.model)
+
+    @cached_property
+    def _straight(self) -> bool:
+        return tangent.is_straight(self.model)
+
+    @cached_property
+    def _tangent(self) -> mujoco.MjModel:
+        return tangent.tangent(self.model, self.operating_point)
 
     def second_order(self) -> SecondOrder:
-        """True M, C, K for small motion about the operating point.
+        """True M, C, K for small motion about the operating point, kinks left alone (see `lab.tangent`).
 
         Raises:
             RigError: the model has equality constraints, which M, C, K cannot hold.
@@ -232,12 +240,12 @@ class Rig:
 
     @cached_property
     def _second_order(self) -> SecondOrder:
-        M, C_d, K = linearize.matrices(self.model, self.operating_point, analytic=self.linear)
+        M, C_d, K = linearize.matrices(self._tangent, self.operating_point, analytic=self._straight)
         return SecondOrder(M, C_d, K, self.dofs)
 
     @cached_property
     def _linearized(self) -> tuple[Array, Array, Array, Array]:
-        return linearize.state_space(self.model, self.operating_point, exact=self.linear)
+        return linearize.state_space(self._tangent, self.operating_point, exact=self._straight)
 
     @cached_property
     def _everything(self) -> StateSpace:

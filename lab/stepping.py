@@ -11,8 +11,7 @@ import copy
 import itertools
 import os
 import re
-from collections.abc import Iterator, Sequence
-from contextlib import contextmanager
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import mujoco
@@ -20,6 +19,7 @@ import numpy as np
 from mujoco import rollout
 
 from identification.recording import Array
+from lab import mjcf
 from lab.errors import DivergedError
 from lab.rig import Rig
 
@@ -159,7 +159,7 @@ class Stepper:
         if forces is None:
             forces = np.zeros((self.n_batch, m.nv, n_steps))
         control = np.ascontiguousarray(np.concatenate([controls, forces], axis=1).transpose(0, 2, 1))
-        with _quiet() as complaints, rollout.Rollout(nthread=len(self._data)) as pool:
+        with mjcf.quiet() as complaints, rollout.Rollout(nthread=len(self._data)) as pool:
             states, sensordata = pool.rollout(
                 m, self._data, self._states, control, control_spec=int(CONTROL), chunk_size=1
             )
@@ -195,15 +195,3 @@ def readings_at_rest(rig: Rig) -> Array:
     mujoco.mj_forward(rig.model, data)
     # What moves by rounding only is at rest: keep exact zeros exact.
     return np.where(np.abs(data.sensordata) < 1e-13, 0.0, data.sensordata)
-
-
-@contextmanager
-def _quiet() -> Iterator[list[str]]:
-    """Collects MuJoCo's warnings, which it would write to a log file in the working directory."""
-    complaints: list[str] = []
-    before = mujoco.get_mju_user_warning()
-    mujoco.set_mju_user_warning(complaints.append)
-    try:
-        yield complaints
-    finally:
-        mujoco.set_mju_user_warning(before)
