@@ -1,4 +1,4 @@
-"""How far covariances must reach: as long as the slowest oscillation of the structure takes to go round once.
+"""How far covariances must reach and how many modes to look for, as the spectra of the outputs show.
 
 The shift from one block row to the next turns a pole by ω dt. A horizon much shorter than a period sees
 little of that turn, and noise decides; a horizon of many periods adds lags where little is left but noise.
@@ -7,6 +7,8 @@ little of that turn, and noise decides; a horizon of many periods adds lags wher
 from __future__ import annotations
 
 import itertools
+import math
+from collections.abc import Sequence
 
 import numpy as np
 import scipy.fft
@@ -15,6 +17,12 @@ from identification.recording import Array, Recording
 
 MAX_SEGMENT = 1 << 14
 MAX_SAMPLES = 1 << 17
+"""Samples of a record that the search for peaks looks at, and the longest segment of its spectra."""
+
+MAX_ORDER = 100
+MAX_COLUMNS = 1500
+MAX_VALUES = 1 << 24
+"""Bounds on the sweep and on the Hankel matrix, which keep the work in seconds and in 128 MiB."""
 
 
 def resonance_peaks(recording: Recording) -> list[float]:
@@ -33,16 +41,44 @@ def resonance_peaks(recording: Recording) -> list[float]:
 
     Source: Welch (1967), IEEE Trans. Audio Electroacoust. 15, for the averaged spectra.
     """
-    longest = min(max(record.n_samples for record in recording.records), MAX_SAMPLES)
-    length = min(1 << (longest // 8).bit_length() - 1, MAX_SEGMENT)
-    if length < 32:
+    longest = max(record.n_samples for record in recording.records)
+    if longest < 256:
         return []
-    with np.errstate(
-        invalid="ignore", over="ignore"
-    ):  # whoever needs the samples names those that are missing
+    length = min(1 << (min(longest, MAX_SAMPLES) // 8).bit_length() - 1, MAX_SEGMENT)
+    # Whoever needs the samples names those that are missing.
+    with np.errstate(invalid="ignore", over="ignore"):
         power = _relative_power(recording, length)
     found = [k for k in _peaks(power, 4.0) if k >= 2 and power[k] >= 1e-3 * np.max(power)]
     return [k * recording.sample_rate / length for k in found]
+
+
+def choose_orders(recording: Recording, n_peaks: int) -> tuple[list[int], str]:
+    """Orders to sweep, three times as many modes as there are resonance peaks, and the reason."""
+    highest = min(max(6 * n_peaks, 20), MAX_ORDER)
+    affordable = max(recording.n_samples // 20 * 2, 2)
+    if affordable < highest:
+        return list(range(2, affordable + 1, 2)), f"Orders go up to {affordable}, one state per ten samples."
+    return list(range(2, highest + 1, 2)), (
+        f"Orders go up to {highest}, as the spectra show {n_peaks} resonance peaks "
+        f"and three times as many modes are allowed for (at least 10, at most {MAX_ORDER // 2})."
+    )
+
+
+def choose_rows(
+    recording: Recording, peaks: Sequence[float], order: int, n_references: int
+) -> tuple[int, str]:
+    """Block rows for the slowest oscillation, the highest order and the length of the record; the reason."""
+    longest = max(record.n_samples for record in recording.records)
+    period = math.ceil(recording.sample_rate / peaks[0]) if peaks else 0
+    for_order = 2 + -(-3 * order // (2 * n_references))
+    limit = max(min(longest // 4, MAX_VALUES // (MAX_COLUMNS * len(recording.outputs))), 2)
+    if limit < max(period, for_order):
+        n_rows, why = limit, "the most that the length of the record or the memory allows"
+    elif period >= for_order:
+        n_rows, why = period, f"one period of the lowest resonance peak, at {peaks[0]:.4g} Hz"
+    else:
+        n_rows, why = for_order, f"one and a half times as many as order {order} needs"
+    return n_rows, f"The horizon is {n_rows} block rows, {why}."
 
 
 def _relative_power(recording: Recording, length: int) -> Array:

@@ -9,6 +9,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterable, Sequence
 from dataclasses import replace
+from typing import NamedTuple
 
 import numpy as np
 import scipy.linalg
@@ -17,14 +18,10 @@ from numpy.typing import NDArray
 from identification.covariance import output_covariances, reference_rows
 from identification.errors import IdentificationError, OrderError
 from identification.hankel import shift_invariance
-from identification.horizon import resonance_peaks
+from identification.horizon import MAX_COLUMNS, choose_orders, choose_rows, resonance_peaks
 from identification.modes import Modes
 from identification.recording import Array, Recording
 from identification.systems import Realization, StateSpace
-
-MAX_ORDER = 100
-MAX_COLUMNS = 1500
-MAX_VALUES = 1 << 24
 
 
 def ssi_cov(
@@ -58,55 +55,82 @@ def ssi_cov(
     Source: Peeters and De Roeck (1999), Mech. Syst. Signal Process. 13(6); Cambraia and Kurka (2010), VI
         CONEM, eqs. (24) to (37), with the block columns of eq. (29) in reverse order.
     """
-    n_outputs, n_references = len(recording.outputs), reference_rows(recording, references).size
-    notes: list[str] = []
+    rows = reference_rows(recording, references)
     sweep = order is None and orders is None
+    plan = _plan(recording, _sorted_orders(order, orders), n_rows, rows.size)
+    R = output_covariances(recording, plan.n_lags, references=references)
+    scale = _balance(R, recording, rows)
+    past = range(0, plan.stride * plan.n_columns, plan.stride)
+    H = np.hstack([R[lag : lag + plan.n_rows].reshape(-1, rows.size) for lag in past])
+    del R
+    U, singular_values = leading_subspace(H, plan.orders[-1] + 2)
+    rank = int(np.sum(singular_values > np.finfo(float).eps * max(H.shape) * singular_values[0]))
+    del H
+    wanted = [n for n in plan.orders if n <= rank] if sweep else plan.orders
+    if not wanted or wanted[-1] > rank:
+        raise OrderError(
+            f"order {plan.orders[-1]} exceeds {rank}, the numerical rank of the covariances; "
+            "lower the order, or check the channels where the rank is zero"
+        )
+    systems = tuple(
+        _outputs_only(A, C * scale, recording)
+        for A, C in shift_invariance(U, singular_values, n_outputs=len(scale), orders=wanted)
+    )
+    notes = plan.notes
+    if order is None:
+        order = _largest_gap(singular_values, wanted)
+        notes += (f"The singular values drop most steeply after the first {order}.",)
+    realization = Realization("ssi_cov", systems, singular_values, order, plan.settings(), notes)
+    return replace(realization, notes=(*notes, *horizon_warning(realization.system.modes(), realization)))
+
+
+class _Plan(NamedTuple):
+    """Orders to realize, and the Hankel matrix to realize them from: its columns begin at every `stride`th lag."""
+
+    orders: list[int]
+    n_rows: int
+    n_columns: int
+    stride: int
+    n_references: int
+    notes: tuple[str, ...]
+
+    @property
+    def n_lags(self) -> int:
+        return self.n_rows + self.stride * (self.n_columns - 1)
+
+    def settings(self) -> dict[str, int | float | str]:
+        names = ("n_rows", "n_columns", "stride", "n_references")
+        return {name: getattr(self, name) for name in names}
+
+
+def _plan(recording: Recording, orders: list[int], n_rows: int | None, n_references: int) -> _Plan:
+    """What is left open, chosen from the data."""
+    notes: list[str] = []
+    sweep = not orders
     peaks = resonance_peaks(recording) if sweep or n_rows is None else []
     if sweep:
-        orders, reason = _choose_orders(recording, len(peaks))
+        orders, reason = choose_orders(recording, len(peaks))
         notes.append(reason)
-    wanted = _sorted_orders(order, orders)
     if n_rows is None:
-        n_rows, reason = _choose_rows(recording, peaks, wanted[-1], n_references)
+        n_rows, reason = choose_rows(recording, peaks, orders[-1], n_references)
         notes.append(reason)
     elif n_rows < 2:
         raise IdentificationError(f"{n_rows} block rows were asked for; expected at least 2")
     stride = -(-n_rows * n_references // MAX_COLUMNS)
     n_columns = -(-n_rows // stride)
-    largest = min((n_rows - 1) * n_outputs, n_columns * n_references)
-    if wanted[-1] > largest:
-        raise OrderError(
-            f"order {wanted[-1]} exceeds {largest}, the most that {n_rows} block rows of {n_outputs} outputs "
-            f"with {n_references} references carry; lower the order or take more block rows"
+    if stride > 1:
+        notes.append(
+            f"The past enters at every {stride}th lag only, as neighbouring ones tell nearly the same."
         )
-    R = output_covariances(recording, n_rows + stride * (n_columns - 1), references=references)
-    scale = _balance(R, recording, reference_rows(recording, references))
-    H = np.hstack([R[j * stride :][:n_rows].reshape(-1, n_references) for j in range(n_columns)])
-    del R
-    U, singular_values = leading_subspace(H, wanted[-1] + 2)
-    rank = int(np.sum(singular_values > np.finfo(float).eps * max(H.shape) * singular_values[0]))
-    del H
+    largest = min((n_rows - 1) * len(recording.outputs), n_columns * n_references)
     if sweep:
-        wanted = [n for n in wanted if n <= rank] or wanted[:1]
-    if wanted[-1] > rank:
+        orders = [n for n in orders if n <= largest] or orders[:1]
+    if orders[-1] > largest:
         raise OrderError(
-            f"order {wanted[-1]} exceeds {rank}, the numerical rank of the Hankel matrix; lower the order"
+            f"order {orders[-1]} exceeds {largest}, the most that {n_rows} block rows of {len(recording.outputs)} "
+            f"outputs with {n_references} references carry; lower the order or take more block rows"
         )
-    systems = tuple(
-        _outputs_only(A, C * scale, recording)
-        for A, C in shift_invariance(U, singular_values, n_outputs=n_outputs, orders=wanted)
-    )
-    if order is None:
-        order = _largest_gap(singular_values, wanted)
-        notes.append(f"The singular values drop most steeply after the first {order}.")
-    settings: dict[str, int | float | str] = {
-        "n_rows": n_rows,
-        "n_columns": n_columns,
-        "stride": stride,
-        "n_references": n_references,
-    }
-    realization = Realization("ssi_cov", systems, singular_values, order, settings, tuple(notes))
-    return replace(realization, notes=(*notes, *horizon_warning(realization.system.modes(), realization)))
+    return _Plan(orders, n_rows, n_columns, stride, n_references, tuple(notes))
 
 
 def leading_subspace(H: Array, n: int) -> tuple[Array, Array]:
@@ -142,40 +166,12 @@ def _outputs_only(A: Array, C: Array, recording: Recording) -> StateSpace:
     return StateSpace(A, np.zeros((n, 0)), C, np.zeros((len(C), 0)), recording.dt, (), recording.outputs)
 
 
-def _choose_orders(recording: Recording, n_peaks: int) -> tuple[range, str]:
-    """Orders to sweep, three times as many modes as there are resonance peaks, and the reason."""
-    highest = min(max(6 * n_peaks, 20), MAX_ORDER)
-    affordable = max(recording.n_samples // 20 * 2, 2)
-    if affordable < highest:
-        return range(2, affordable + 1, 2), f"Orders go up to {affordable}, one state per ten samples."
-    return range(2, highest + 1, 2), (
-        f"Orders go up to {highest}, as the spectra show {n_peaks} resonance peaks "
-        f"and three times as many modes are allowed for (at least 10, at most {MAX_ORDER // 2})."
-    )
-
-
 def _sorted_orders(order: int | None, orders: Iterable[int] | None) -> list[int]:
-    wanted = sorted({*(orders or ()), *(() if order is None else (order,))})
-    if not wanted or wanted[0] < 1:
+    """Orders asked for, rising; empty when the data are to decide."""
+    wanted = sorted({*(() if orders is None else orders), *(() if order is None else (order,))})
+    if (orders is not None and not wanted) or any(n < 1 for n in wanted):
         raise OrderError(f"orders are {wanted}; expected whole numbers from 1 on")
     return wanted
-
-
-def _choose_rows(
-    recording: Recording, peaks: Sequence[float], order: int, n_references: int
-) -> tuple[int, str]:
-    """Block rows for the slowest oscillation, the highest order and the length of the record; the reason."""
-    longest = max(record.n_samples for record in recording.records)
-    period = math.ceil(recording.sample_rate / peaks[0]) if peaks else 0
-    for_order = 2 + -(-3 * order // (2 * n_references))
-    limit = max(min(longest // 4, MAX_VALUES // (MAX_COLUMNS * len(recording.outputs))), 2)
-    if limit < max(period, for_order):
-        n_rows, why = limit, "the most that the length of the record or the memory allows"
-    elif period >= for_order:
-        n_rows, why = period, f"one period of the lowest resonance peak, at {peaks[0]:.4g} Hz"
-    else:
-        n_rows, why = for_order, f"one and a half times as many as order {order} needs"
-    return n_rows, f"The horizon is {n_rows} block rows, {why}."
 
 
 def horizon_warning(modes: Modes, realization: Realization) -> tuple[str, ...]:
@@ -199,14 +195,16 @@ def _balance(R: Array, recording: Recording, rows: NDArray[np.intp]) -> Array:
     one unit share a scale, because among them the size of a signal does tell its weight against the noise.
     """
     units = np.array([channel.unit for channel in recording.outputs])
-    scale = np.ones(units.size)
+    scale, reference_scale = np.ones(units.size), np.ones(rows.size)
     if np.all(units == units[0]):
         return scale[:, None]
-    reference_scale = np.ones(rows.size)
-    for unit in set(units):
+    for unit in set(units[rows]):
+        outs, refs = units == unit, units[rows] == unit
+        scale[outs] = reference_scale[refs] = np.sqrt(np.linalg.norm(R[:, outs][:, :, refs])) or 1.0
+    R /= reference_scale
+    for unit in set(units) - set(units[rows]):
         scale[units == unit] = np.linalg.norm(R[:, units == unit]) or 1.0
-        reference_scale[units[rows] == unit] = np.linalg.norm(R[:, :, units[rows] == unit]) or 1.0
-    R /= scale[:, None] * reference_scale
+    R /= scale[:, None]
     return scale[:, None]
 
 
