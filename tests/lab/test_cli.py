@@ -102,6 +102,15 @@ def test_quiet_says_nothing(bench, capsys):
     assert capsys.readouterr().out == ""
 
 
+def test_a_terminal_sees_progress(bench, capsys, monkeypatch):
+    monkeypatch.setattr("sys.stderr.isatty", lambda: True)
+    assert status("run", "small.toml", "--out", "again", "--json") == 0
+    printed = capsys.readouterr()
+    assert "simulating" in printed.err
+    assert "100%" in printed.err
+    json.loads(printed.out)
+
+
 def test_identify_finds_the_same_modes(finished, bench, capsys):
     for extra in ([], ["--method", "era"], ["--method", "era", "--order", "6"]):
         arguments = ["identify", finished / "recording.h5", *extra, "--out", "again", "--force", "--json"]
