@@ -203,6 +203,12 @@ def _svd(H: Array) -> tuple[Array, Array, Array]:
 
 def hankel_size(markov: MarkovParameters, n_rows: int | None, n_columns: int | None) -> tuple[int, int]:
     """Block rows and columns: as asked, or such that all lags are used at a bearable cost."""
+    if not markov.inputs or not markov.outputs:
+        raise IdentificationError(
+            f"{len(markov.outputs)} outputs and {len(markov.inputs)} inputs make no Hankel matrix; "
+            f"expected at least "
+            "one of each"
+        )
     lags = markov.n_lags - 1  # lag 0 is D; H(1) ends one lag later than H(0)
     if n_columns is None:
         n_columns = lags - n_rows if n_rows else max(1, min(lags // 2, 500 // len(markov.inputs)))

@@ -9,6 +9,7 @@ import numpy as np
 import scipy.linalg
 import scipy.signal
 
+from identification.errors import RecordingError
 from identification.recording import Array, Recording
 from identification.regression import BLOCK, FROM_REST, least_squares, rms, triangular
 from identification.systems import Complex, StateSpace
@@ -23,17 +24,25 @@ def fit_inputs(system: StateSpace, recording: Recording) -> StateSpace:
     whatever the number of outputs.
 
     Args:
-        system: sampled model with the channels of the recording; a pole outside the unit circle must not grow
-            beyond the range of numbers within a record.
+        system: sampled model with the channels of the recording; a pole outside the unit circle must not
+            grow beyond the range of numbers within a record.
         recording: records with inputs.
 
     Returns:
         The model; least squares by orthogonal factorization, block by block, so long records need
         little memory.
 
-    Source: McKelvey, Akçay and Ljung (1996), IEEE Trans. Autom. Control 41(7), section III, in the time
-    domain.
+    Raises:
+        RecordingError: the channels are not those of the model.
+
+    Source: Ljung (1999), System Identification, 2nd ed., section 10.6.
     """
+    if (system.inputs, system.outputs) != (recording.inputs, recording.outputs):
+        raise RecordingError(
+            f"the recording has {len(recording.inputs)} inputs and {len(recording.outputs)} outputs that "
+            f"are not "
+            f"those of the model ({len(system.inputs)} and {len(system.outputs)}); select the same channels"
+        )
     z, phi = scipy.linalg.eig(system.A)
     own = np.flatnonzero(z.imag >= 0)
     z, phi = z[own], phi[:, own]
@@ -57,14 +66,14 @@ def _n_columns(system: StateSpace, z: Complex) -> int:
 def _rows(system: StateSpace, recording: Recording, z: Complex, shapes: Complex) -> Iterator[Array]:
     """Regression rows [B | D | initial states | y] of outputs scaled to unit RMS, block by block."""
     n_outputs, n_inputs = system.D.shape
-    scale = 1 / rms(recording)[n_inputs:]
+    size = rms(recording)[n_inputs:]
+    scale = 1 / np.where(size > 0, size, 1)
     n_fixed = _n_columns(system, z)
     n_records = len(recording.records)
-    size = max(1, BLOCK // n_outputs)
     for number, record in enumerate(recording.records):
         state = np.zeros((z.size, n_inputs), dtype=complex)
         start = 0
-        for u, y in record.blocks(size):
+        for u, y in record.blocks(max(1, BLOCK // n_outputs)):
             n = u.shape[1]
             x = np.empty((z.size, n_inputs, n), dtype=complex)
             for r, pole in enumerate(z):

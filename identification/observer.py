@@ -47,12 +47,13 @@ class Observer:
     def markov(self, n_lags: int) -> Array:
         """Markov parameters of the structure in scaled channels, shape (n_lags, n_outputs, n_inputs).
 
-        Source: Juang, Phan, Horta and Longman (1993), J. Guidance 16(2): the response of the predictor
-            to a unit
-        pulse, Y_k = beta_k + Σ alpha_i Y_(k - i) with i = 1 … min(k, length), and Y_0 = D.
+        They are the response of the predictor to a unit pulse: Y_k = beta_k + Σ alpha_i Y_(k - i) with
+        i = 1 … min(k, length), and Y_0 = D.
 
         Raises:
             IdentificationError: the response grows beyond all bounds.
+
+        Source: Juang, Phan, Horta and Longman (1993), J. Guidance 16(2), 320-329.
         """
         Y = np.zeros((n_lags, *self.direct.shape))
         Y[:1] = self.direct
@@ -73,9 +74,8 @@ def observe(recording: Recording, *, observer: int | None = None) -> Observer:
     """The predictor that fits the recording best, of a length chosen from the data when None.
 
     One triangular factor serves all lengths: the rows of its last columns below the columns of a length
-    are the prediction errors left at that length. With noise, twice the length that minimizes Akaike's
-    corrected criterion
-    is taken: that criterion is made for the next sample, and poles profit from a longer look back.
+    are the prediction errors left at that length. With noise, the length is twice the one that minimizes
+    Akaike's corrected criterion, which is made for the next sample; poles profit from a longer look back.
     Without noise any length that is long enough is exact, and the longer it is the better conditioned.
 
     Args:
@@ -98,15 +98,12 @@ def observe(recording: Recording, *, observer: int | None = None) -> Observer:
     R, n_rows = _factor(recording, scale, longest)
     split = n_inputs + longest * width
     lengths = np.arange(1, longest + 1, dtype=np.int64)
-    errors = (
-        _mean_squares(R[:, split:], n_inputs + lengths * width) / n_rows
-    )  # (length, n_outputs, n_outputs)
+    # Mean square errors of each length, (longest, n_outputs, n_outputs)
+    errors = _mean_squares(R[:, split:], n_inputs + lengths * width) / n_rows
     exact = bool(np.max(np.trace(errors[-1])) < n_outputs * 1e-18)
-    p, note = (
-        (observer, f"The observer looks back {observer} samples, as asked for.")
-        if observer
-        else _choose(errors, n_rows, width, exact)
-    )
+    p, note = longest, f"The observer looks back {longest} samples, as asked for."
+    if observer is None:
+        p, note = _choose(errors, n_rows, width, exact)
     n_columns = n_inputs + p * width
     theta, _ = least_squares(R[:n_columns, :n_columns], R[:n_columns, split:], 1e-10 if exact else 1e-13)
     past = theta[n_inputs:].reshape(p, width, n_outputs).transpose(0, 2, 1)

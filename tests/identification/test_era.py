@@ -121,6 +121,12 @@ def test_too_few_lags_are_refused():
         era_dc(markov, 6, step=5)
 
 
+def test_no_inputs_make_no_hankel_matrix():
+    markov = MODELS["chain3_uncoupled"].markov(20)
+    with pytest.raises(IdentificationError, match="2 outputs and 0 inputs make no Hankel matrix"):
+        era(replace(markov, values=markov.values[:, :, :0], inputs=()))
+
+
 def test_unknown_form_is_named():
     with pytest.raises(IdentificationError, match="input_normal, balanced, output_normal"):
         era(MODELS["chain3_uncoupled"].markov(50), 6, form="modal")

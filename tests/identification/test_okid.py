@@ -268,6 +268,12 @@ def test_fitted_inputs_with_a_real_pole():
     np.testing.assert_allclose(fitted.D, model.D, atol=1e-12)
 
 
+def test_fitted_inputs_need_the_same_channels():
+    recording = random_recording(CHAIN3, 100)
+    with pytest.raises(RecordingError, match="select the same channels"):
+        fit_inputs(CHAIN3, recording.select(inputs=["force_x1"]))
+
+
 # --- Refusals
 # ------------------------------------------------------------------------------------------------
 
