@@ -136,7 +136,8 @@ def join(poles: Poles, chain: Indices, limits: Thresholds) -> Indices:
         if a != b and not np.any(present[a] & present[b]):
             present[a] |= present[b]
             root[root == b] = a
-    return np.where(chain >= 0, np.unique(root, return_inverse=True)[1][chain], -1)
+    number = np.append(np.unique(root, return_inverse=True)[1], -1)  # the last one serves poles of no chain
+    return number[chain]
 
 
 def keep_long(cluster: Indices) -> Indices:
@@ -159,8 +160,8 @@ def keep_long(cluster: Indices) -> Indices:
         is_long = size > (short + long) / 2
         short, long = np.sum(size[~is_long]) / (1 + np.sum(~is_long)), float(np.mean(size[is_long]))
     is_long = (size > (short + long) / 2) & (length >= MIN_LENGTH)
-    number = np.where(is_long, np.cumsum(is_long) - 1, -1)
-    return np.where(cluster >= 0, number[cluster], -1)
+    number = np.append(np.where(is_long, np.cumsum(is_long) - 1, -1), -1)
+    return number[cluster]
 
 
 def cluster_means(poles: Poles, cluster: Indices) -> Poles:
