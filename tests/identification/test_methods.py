@@ -1,0 +1,108 @@
+"""Every method by its name: what it accepts, what it refuses, and that it finds a structure."""
+
+import inspect
+
+import numpy as np
+import pytest
+
+from identification.errors import IdentificationError
+from identification.methods import METHODS, find_method, shows_rank
+from identification.recording import KINDS, Recording
+from identification.systems import Realization
+from tests.ambient import ambient, output_record
+from tests.systems import chain3, chain7, noisy, paper_chain3, pulse_recording, recorded
+
+KIND_OF = {"era": "pulse", "okid_era": "random", "ssi_cov": "ambient"}
+
+
+def suited(method):
+    """A recording that the method is made for, and the frequencies behind it."""
+    if method.name == "ssi_cov":
+        return ambient(20_000, 0), chain7().modes().frequency_hz
+    truth = chain3().modes().frequency_hz
+    if method.name == "okid_era":
+        forces = np.random.default_rng(1).standard_normal((2, 1000))
+        return recorded(paper_chain3(), [forces]), truth
+    return pulse_recording(paper_chain3(), 200), truth
+
+
+@pytest.mark.parametrize("method", METHODS.values(), ids=METHODS)
+def test_it_is_described(method):
+    assert METHODS[method.name] is method
+    assert find_method(method.name) is method
+    assert set(method.kinds) <= set(KINDS)
+    assert KIND_OF[method.name] in method.kinds
+    assert method.summary.endswith(".")
+    assert "Source:" in inspect.getdoc(method.function)
+    assert "orders" in method.settings
+
+
+@pytest.mark.parametrize("method", METHODS.values(), ids=METHODS)
+def test_it_finds_a_structure_at_a_given_order(method):
+    recording, frequency_hz = suited(method)
+    realization = method(recording, 2 * frequency_hz.size)
+    assert isinstance(realization, Realization)
+    assert realization.method == method.name
+    assert realization.orders == (2 * frequency_hz.size,)
+    # Exact but for the scatter of outputs alone, three times 0.2 %.
+    accuracy = 1e-2 if method.name == "ssi_cov" else 1e-9
+    np.testing.assert_allclose(realization.system.modes().frequency_hz, frequency_hz, rtol=accuracy)
+
+
+@pytest.mark.parametrize("method", METHODS.values(), ids=METHODS)
+def test_it_sweeps_the_orders_asked_for(method):
+    recording, _ = suited(method)
+    assert method(recording, 6, orders=[2, 4]).orders == (2, 4, 6)
+
+
+@pytest.mark.parametrize("method", METHODS.values(), ids=METHODS)
+def test_it_ignores_no_setting(method):
+    recording, _ = suited(method)
+    with pytest.raises(IdentificationError, match=rf"{method.name}' has no setting 'n_row'.*orders"):
+        method(recording, n_row=3)
+
+
+def test_an_unknown_name_is_told_with_those_that_exist():
+    with pytest.raises(IdentificationError, match=r"'eera' does not exist; there are era, okid_era, ssi_cov"):
+        find_method("eera")
+
+
+def test_forces_are_asked_for_where_they_are_needed():
+    with pytest.raises(IdentificationError, match="needs the forces"):
+        METHODS["okid_era"](ambient(500, 1))
+
+
+def with_noise(recording, level):
+    rng = np.random.default_rng(2)
+    records = [
+        type(record)(record.kind, record.inputs, noisy(np.asarray(record.outputs), level, rng))
+        for record in recording.records
+    ]
+    return Recording(tuple(records), recording.inputs, recording.outputs, recording.sample_rate)
+
+
+@pytest.mark.parametrize("name", ["era", "okid_era"])
+def test_exact_data_show_their_rank_and_noisy_data_are_swept(name):
+    recording, _ = suited(METHODS[name])
+    exact = METHODS[name](recording)
+    assert shows_rank(exact)
+    assert exact.orders == (6,)
+    measured = METHODS[name](with_noise(recording, 0.05))
+    assert not shows_rank(measured)
+    assert measured.order == 6
+    assert measured.orders == (2, 4, 6, 8, 10, 12)
+
+
+def test_free_decays_are_realized_without_forces():
+    system = paper_chain3()
+    at_rest = np.zeros((2, 150))
+    rng = np.random.default_rng(3)
+    moving = recorded(system, [at_rest, at_rest], initial=rng.standard_normal((2, 6)))
+    decays = Recording(
+        tuple(output_record(np.asarray(record.outputs), "free_decay") for record in moving.records),
+        (),
+        moving.outputs,
+        moving.sample_rate,
+    )
+    found = METHODS["era"](decays).system.modes()
+    np.testing.assert_allclose(found.poles, chain3().modes().poles, rtol=1e-9)
