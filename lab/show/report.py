@@ -18,6 +18,7 @@ from markupsafe import Markup
 from identification.recording import Recording
 from lab.result import Result
 from lab.show.figures import Drawing, draw, matrix_maps
+from lab.show.signals import measured_inputs
 from lab.show.tables import MAX_PRINTED, criteria_rows, matrix_summary, matrix_tables, modes_table, same_dofs
 from lab.show.verdict import verdict
 
@@ -94,7 +95,7 @@ def _about(result: Result, recording: Recording) -> str:
     return (
         f"Identified by {realization.method}, order {realization.order}, "
         f"from {n} record{'s' if n > 1 else ''} ({kinds}) "
-        f"with {len(recording.inputs)} inputs and {len(recording.outputs)} outputs, "
+        f"with {len(measured_inputs(recording))} inputs and {len(recording.outputs)} outputs, "
         f"{recording.duration:g} s at {recording.sample_rate:g} Hz."
     )
 

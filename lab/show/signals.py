@@ -12,7 +12,7 @@ import numpy as np
 import scipy.fft
 import scipy.signal
 
-from identification.recording import Record, Recording
+from identification.recording import Channel, Record, Recording
 
 TRANSIENT = ("pulse", "impact", "burst_random", "free_decay")
 """Kinds whose records begin and end at rest, so that a whole record needs no window."""
@@ -46,6 +46,7 @@ class Spectra:
         cross_density: outputs against inputs, shape (n_frequencies, n_outputs, n_inputs).
         n_averages: segments averaged.
         window: "Hann", or "none" for whole transient records.
+        remainder: RMS of the last tenth of the segments over that of the first, the largest of all outputs.
     """
 
     frequency_hz: np.ndarray
@@ -54,6 +55,7 @@ class Spectra:
     cross_density: np.ndarray
     n_averages: int
     window: str
+    remainder: float
 
 
 def envelope(record: Record, sample_rate: float, *, n_bins: int = 2000) -> Envelope:
@@ -129,6 +131,7 @@ def spectra(recording: Recording, *, n_segment: int = 8192, n_averages: int = 12
     outputs = np.zeros((len(recording.outputs), n_frequencies))
     inputs = np.zeros((n_frequencies, n_inputs, n_inputs), dtype=complex)
     cross = np.zeros((n_frequencies, len(recording.outputs), n_inputs), dtype=complex)
+    first, last, tenth = *np.zeros((2, len(recording.outputs))), -(-n // 10)
     count = 0
     for u, y in _segments(recording, n, n if whole else n // 2, n_averages):
         if not whole:
@@ -138,6 +141,8 @@ def spectra(recording: Recording, *, n_segment: int = 8192, n_averages: int = 12
         outputs += np.abs(Y) ** 2
         inputs += U[:, :, None] * U[:, None, :].conj()
         cross += Y.T[:, :, None] * U[:, None, :].conj()
+        first += np.sum(y[:, :tenth] ** 2, axis=1)
+        last += np.sum(y[:, -tenth:] ** 2, axis=1)
         count += 1
     if not count:
         return None
@@ -152,6 +157,7 @@ def spectra(recording: Recording, *, n_segment: int = 8192, n_averages: int = 12
         cross * scale[:, None, None],
         count,
         "none" if whole else "Hann",
+        float(np.sqrt(np.max(last / np.where(first > 0, first, np.inf), initial=0.0))),
     )
 
 
@@ -202,7 +208,12 @@ def mean_density(spectrum: Spectra) -> np.ndarray:
     return np.mean(spectrum.output_density[lively] / total[lively], axis=0)
 
 
+def measured_inputs(recording: Recording) -> tuple[Channel, ...]:
+    """The input channels, unless no record has them."""
+    return recording.inputs if any(record.inputs.shape[0] for record in recording.records) else ()
+
+
 def upper_frequency(sample_rate: float, modes_hz: np.ndarray) -> float:
-    """Where a frequency axis ends: twice the highest mode, and at most half the sample rate [Hz]."""
+    """Where a frequency axis ends: half above the highest mode, and at most half the sample rate [Hz]."""
     highest = float(np.max(modes_hz, initial=0.0))
-    return min(sample_rate / 2, 2 * highest) if highest > 0 else sample_rate / 2
+    return min(sample_rate / 2, 1.5 * highest) if highest > 0 else sample_rate / 2

@@ -114,7 +114,7 @@ def with_std(value: float | None, std: float | None, scale: float = 1.0) -> str:
     if std is None or not math.isfinite(std):
         return f"{value:#.6g}"
     std *= scale
-    if std <= 1e-6 * abs(value):
+    if std <= 1e-4 * abs(value):
         return f"{value:#.6g} ± {std:.1e}"
     decimals = max(0, 1 - math.floor(math.log10(std)))
     return f"{value:.{decimals}f} ± {std:.{decimals}f}"

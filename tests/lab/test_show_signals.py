@@ -8,7 +8,14 @@ from hypothesis import strategies as st
 
 from identification.recording import Channel, Record, Recording
 from identification.systems import SecondOrder
-from lab.show.signals import envelope, frequency_response, mean_density, spectra
+from lab.show.signals import (
+    envelope,
+    frequency_response,
+    mean_density,
+    measured_inputs,
+    spectra,
+    upper_frequency,
+)
 
 RNG = np.random.default_rng(1)
 
@@ -131,3 +138,25 @@ def test_segments_with_missing_samples_are_left_out():
     assert np.isfinite(part.output_density).all()
     assert full.n_averages - part.n_averages == 2  # half overlap: each sample lies in two segments
     assert spectra(recording(["ambient"], [np.zeros((0, 600))], [np.full((1, 600), np.nan)])) is None
+
+
+def test_remainder_tells_whether_a_transient_died_down():
+    t = np.arange(1000) / 100.0
+    y = np.exp(-0.5 * t)[None]
+    spectrum = spectra(recording(["free_decay"], [np.zeros((0, 1000))], [y]))
+    assert spectrum.remainder == pytest.approx(np.exp(-0.5 * 9.0), rel=0.01)  # nine tenths of 10 s later
+
+
+def test_inputs_that_no_record_has_are_not_measured():
+    channels = (Channel("f", "N"),), (Channel("y", "m"),)
+    y = np.zeros((1, 10))
+    silent = Recording((Record("ambient", np.zeros((0, 10)), y),), *channels, 1.0)
+    assert measured_inputs(silent) == ()
+    driven = Recording((Record("random", y, y), Record("ambient", np.zeros((0, 10)), y)), *channels, 1.0)
+    assert measured_inputs(driven) == channels[0]
+
+
+def test_frequency_axis_ends_above_the_highest_mode():
+    assert upper_frequency(100.0, np.array([1.0, 10.0])) == 15.0
+    assert upper_frequency(100.0, np.array([45.0])) == 50.0
+    assert upper_frequency(100.0, np.zeros(0)) == 50.0

@@ -165,7 +165,7 @@ def mark_modes(axes: Axes, frequency_hz: np.ndarray, *, numbered: bool = True) -
         if not low <= frequency <= high:
             continue
         axes.axvline(frequency, color="0.45", linestyle=":", linewidth=0.8, zorder=0)
-        if numbered and frequency - last > 0.015 * (high - low):
+        if numbered and frequency - last > 0.025 * (high - low):
             axes.annotate(
                 str(number),
                 (frequency, 1),

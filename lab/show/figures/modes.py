@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
@@ -149,17 +147,27 @@ def mac_table(result: Result) -> Drawing | None:
 
     def paint(figure: Figure) -> None:
         axes = figure.subplots()
-        axes.imshow(value, cmap="Greys", vmin=0, vmax=1)
-        _names(axes, rows, columns)
-        axes.set_ylabel("identified [Hz]")
-        axes.set_xlabel(f"{against} [Hz]")
-        if max(value.shape) <= MAX_NAMED:
+        axes.imshow(
+            value, cmap="Greys", vmin=0, vmax=1, extent=(0.5, len(columns) + 0.5, len(rows) + 0.5, 0.5)
+        )
+        named = max(value.shape) <= MAX_NAMED
+        axes.set_ylabel("identified [Hz]" if named else "identified mode")
+        axes.set_xlabel(f"{against} [Hz]" if named else f"{against} mode")
+        axes.xaxis.set_major_locator(MaxNLocator(integer=True))
+        axes.yaxis.set_major_locator(MaxNLocator(integer=True))
+        if named:
+            axes.set_yticks(range(1, len(rows) + 1), rows)
+            axes.set_xticks(range(1, len(columns) + 1), columns, rotation=90 if len(columns) > 6 else 0)
             for (i, j), entry in np.ndenumerate(value):
-                axes.text(
-                    j, i, f"{entry:.2f}", ha="center", va="center", color="white" if entry > 0.5 else "black"
-                )
+                ink = "white" if entry > 0.5 else "black"
+                axes.text(j + 1, i + 1, f"{entry:.2f}", ha="center", va="center", color=ink)
 
-    caption = f"Modal assurance criterion (MAC), identified against {against} modes: white 0, black 1."
+    whose = (
+        "of the identified modes among themselves"
+        if other is result.modes
+        else "identified against true modes"
+    )
+    caption = f"Modal assurance criterion (MAC), {whose}: white 0, black 1."
     return drawing("mac", min(5.0, 1.0 + 0.42 * len(rows)), caption, paint)
 
 
@@ -182,7 +190,7 @@ def singular_values(result: Result) -> Drawing | None:
         axes.set_ylabel("singular value")
 
     caption = (
-        f"Singular values of {result.realization.method}; the dashed line closes the order chosen, {order}."
+        f"Singular values of {result.realization.method}; the dashed line marks the order chosen, {order}."
     )
     return drawing("singular", 1.9, caption, paint)
 
@@ -216,10 +224,3 @@ def matrix_maps(found: SecondOrder, truth: SecondOrder | None) -> Drawing:
         "Mass, damping and stiffness: white 0, blue negative, red positive, full colour at the number given."
     )
     return drawing("matrices", 6.0 if len(what) > 1 else 7.0, caption, paint)
-
-
-def _names(axes: Axes, rows: Sequence[str], columns: Sequence[str]) -> None:
-    if max(len(rows), len(columns)) > MAX_NAMED:
-        return
-    axes.set_yticks(range(len(rows)), rows)
-    axes.set_xticks(range(len(columns)), columns, rotation=90 if len(columns) > 6 else 0)

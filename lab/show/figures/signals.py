@@ -14,7 +14,7 @@ from identification.systems import StateSpace
 from lab.result import Result
 from lab.show.drawing import SERIES
 from lab.show.figures.canvas import DASHES, Drawing, drawing, few_ticks, logarithmic, mark_modes, plain
-from lab.show.signals import Spectra, envelope, frequency_response, upper_frequency
+from lab.show.signals import Spectra, envelope, frequency_response, measured_inputs, upper_frequency
 
 MAX_INPUTS, MAX_OUTPUTS = 4, 8
 """Time histories shown."""
@@ -23,6 +23,8 @@ MAX_RESPONSES = 4
 Look = dict[str, Any]
 MEASURED: Look = {"color": "0.6", "linewidth": 2.0}
 IDENTIFIED: Look = {"color": SERIES[0], "linestyle": (0, (4, 2)), "linewidth": 1.0}
+FEW_LINES = 60
+"""Spectra of up to so many lines show each of them."""
 MAX_LINES = 6
 """Spectra drawn one by one in one frame; of more, all are drawn alike with their mean."""
 
@@ -32,7 +34,8 @@ def time_histories(recording: Recording) -> Drawing:
     parts = [envelope(record, recording.sample_rate, n_bins=400) for record in recording.records]
     lengths = [record.n_samples / recording.sample_rate for record in recording.records]
     starts = np.concatenate([[0.0], np.cumsum(lengths)])
-    strips = [("inputs", row, c) for row, c in enumerate(recording.inputs[:MAX_INPUTS])]
+    inputs = measured_inputs(recording)
+    strips = [("inputs", row, c) for row, c in enumerate(inputs[:MAX_INPUTS])]
     strips += [("outputs", row, c) for row, c in enumerate(recording.outputs[:MAX_OUTPUTS])]
 
     def paint(figure: Figure) -> None:
@@ -57,7 +60,7 @@ def time_histories(recording: Recording) -> Drawing:
         caption += " Dotted lines: where the next record begins."
     if max(part.samples_per_bin for part in parts) > 1:
         caption += " The band runs from the smallest to the largest sample around each instant."
-    return drawing("time", 0.4 + 0.55 * len(strips), caption + _left_out(recording), paint)
+    return drawing("time", 0.4 + 0.55 * len(strips), caption + _left_out(inputs, recording.outputs), paint)
 
 
 def _strip(axes: Axes, time: np.ndarray, signal: np.ndarray, samples_per_bin: int, *, held: bool) -> None:
@@ -67,12 +70,12 @@ def _strip(axes: Axes, time: np.ndarray, signal: np.ndarray, samples_per_bin: in
         axes.plot(time, signal, color="0.15", linewidth=0.7, drawstyle="steps-post" if held else "default")
 
 
-def _left_out(recording: Recording) -> str:
+def _left_out(inputs: Sequence[Channel], outputs: Sequence[Channel]) -> str:
     more = [
         f"{len(channels) - limit} of {len(channels)} {side}"
         for side, channels, limit in (
-            ("inputs", recording.inputs, MAX_INPUTS),
-            ("outputs", recording.outputs, MAX_OUTPUTS),
+            ("inputs", inputs, MAX_INPUTS),
+            ("outputs", outputs, MAX_OUTPUTS),
         )
         if len(channels) > limit
     ]
@@ -110,7 +113,9 @@ def _densities(axes: Axes, frequency: np.ndarray, density: np.ndarray, names: Se
     positive = np.where(density > 0, density, np.nan)
     if len(names) <= MAX_LINES:
         for i, name in enumerate(names):
-            axes.plot(frequency, positive[i], color=SERIES[i], linestyle=DASHES[i], label=plain(name, 20))
+            marker = "." if frequency.size <= FEW_LINES else ""
+            look = {"color": SERIES[i], "linestyle": DASHES[i], "marker": marker}
+            axes.plot(frequency, positive[i], label=plain(name, 20), **look)
         axes.legend(loc="center left", bbox_to_anchor=(1.0, 0.5))
     else:
         axes.plot(frequency, positive.T, color="0.7", linewidth=0.5)
@@ -161,6 +166,8 @@ def responses(recording: Recording, spectrum: Spectra, result: Result) -> Drawin
 
     total = len(recording.inputs) * len(recording.outputs)
     caption = "Frequency responses (H1), magnitude and phase: grey measured, dashed the identified model."
+    if spectrum.window == "none" and spectrum.remainder > 0.01:
+        caption += " The records end before the motion has died down, which blunts the measured peaks."
     if total > len(pairs):
         caption += f" {len(pairs)} of {total} shown, driving points first."
     return drawing("frf", 0.3 + 2.7 * n_rows, caption, paint)
@@ -190,8 +197,8 @@ def _model_response(
 
 
 def _response(upper: Axes, lower: Axes, frequency: np.ndarray, H: np.ndarray, label: str, look: Look) -> None:
-    if frequency.size <= 100:
-        look = {**look, "marker": "."}
+    if frequency.size <= FEW_LINES:
+        look = {**look, "marker": ".", "linestyle": ""}
     upper.plot(frequency, np.where(np.abs(H) > 0, np.abs(H), np.nan), label=label, **look)
     phase = np.degrees(np.angle(H))
     # A jump from -180 to 180 is no motion: break the line there.

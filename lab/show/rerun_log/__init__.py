@@ -91,12 +91,18 @@ def _test_tab(scene: list[rrb.View], series: list[rrb.View]) -> rrb.Container:
     return rrb.Horizontal(left, rrb.Vertical(*series[:MAX_SERIES]), column_shares=[2, 3], name="Test")
 
 
-def _modes_tab(modes: list[rrb.View], stabilization: list[rrb.View]) -> rrb.Container | None:
-    if not modes and not stabilization:
+def _modes_tab(views: list[rrb.View], stabilization: list[rrb.View]) -> rrb.Container | None:
+    """The modes in a grid, below them the stabilization diagram and the key to the numbers of channels."""
+    keys = [view for view in views if isinstance(view, rrb.TextDocumentView)]
+    modes, below = [view for view in views if view not in keys], [*stabilization, *keys]
+    if not modes and not below:
         return None
-    shapes = [rrb.Grid(*modes, grid_columns=min(len(modes), 3 if len(modes) != 4 else 2))] if modes else []
-    shares = [3 if len(modes) <= 3 else 2] * len(shapes) + [2 if len(modes) <= 3 else 1] * len(stabilization)
-    return rrb.Vertical(*shapes, *stabilization, name="Modes", row_shares=shares)
+    columns = 4 if len(modes) > 9 else 2 if len(modes) == 4 else 3
+    parts: list[rrb.Container] = [rrb.Grid(*modes, grid_columns=min(len(modes), columns))] if modes else []
+    if below:
+        parts.append(rrb.Horizontal(*below, column_shares=[4] * len(stabilization) + [1] * len(keys)))
+    shares = [3 if len(modes) <= 3 else 2] * bool(modes) + [2 if len(modes) <= 3 else 1] * bool(below)
+    return rrb.Vertical(*parts, name="Modes", row_shares=shares)
 
 
 def _matrices_tab(views: list[rrb.View], result: Result) -> rrb.Container | None:
@@ -132,19 +138,17 @@ def _time_panel(result: Result, end: float) -> rrb.TimePanel:
 def _summary(result: Result) -> str:
     """Verdict and modes in Markdown."""
     lines = [f"# {plain(result.title)}", "", plain(verdict(result).sentence), ""]
+    compared = result.comparison is not None
     if len(result.modes):
-        lines += [
-            "| Mode | Frequency [Hz] | Damping [%] | Error in frequency | MAC |",
-            "|---:|---:|---:|---:|---:|",
-        ]
+        lines += ["| Mode | Frequency [Hz] | Damping [%] |" + " Error in frequency | MAC |" * compared]
+        lines += ["|---:|---:|---:|" + "---:|---:|" * compared]
     for row in mode_rows(result):
         if row.frequency is None or row.damping is None:
             lines.append(f"| missed | ({row.true_frequency:.5g}) | | | |")
             continue
         error = "" if row.frequency_error is None else f"{row.frequency_error:.1e}"
         agreement = "" if row.mac is None else f"{row.mac:.4f}"
-        lines.append(
-            f"| {row.number} | {row.frequency:.5g} | {100 * row.damping:.4g} | {error} | {agreement} |"
-        )
+        own = f"| {row.number} | {row.frequency:.5g} | {100 * row.damping:.4g} |"
+        lines.append(own + f" {error} | {agreement} |" * compared)
     lines += ["", *[f"- {plain(warning)}" for warning in result.warnings]]
     return "\n".join(lines)

@@ -110,7 +110,7 @@ def _log_shape(
 
 def _log_names(stream: rr.RecordingStream, names: list[str]) -> rrb.View:
     """What the numbers under the shapes stand for."""
-    lines = [f"{number}. {plain(name)}" for number, name in enumerate(names, start=1)]
-    text = "Displacement at each channel, the largest 1. Orange: imaginary part.\n\n" + "\n".join(lines)
+    listed = ", ".join(f"{number}: {plain(name)}" for number, name in enumerate(names, start=1))
+    text = f"Displacement at each channel, the largest 1. Orange: imaginary part. {listed}."
     stream.log("/modes/channels", rr.TextDocument(text, media_type=rr.MediaType.MARKDOWN), static=True)
     return rrb.TextDocumentView(origin="/modes/channels", name="Channels")

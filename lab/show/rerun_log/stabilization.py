@@ -37,7 +37,7 @@ def log_stabilization(stream: rr.RecordingStream, result: Result, recording: Rec
         own = labels == reason
         shown = own & (diagram.frequency_hz <= top)
         color = rgb(SERIES[2] if reason == STABLE else REJECTED[(number - 1) % len(REJECTED)])
-        radius = -3.0 if reason == STABLE else -1.8
+        radius = (-3.0 if diagram.orders.max() <= 50 else -2.0) if reason == STABLE else -1.5
         entity = f"{ORIGIN}/{STABLE}" if reason == STABLE else join(ORIGIN, "rejected", reason)
         stream.log(entity, rr.Points2D(points[shown], colors=color, radii=radius), static=True)
         row, column = divmod(number, PER_ROW)
