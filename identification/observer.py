@@ -76,7 +76,7 @@ def observe(recording: Recording, *, observer: int | None = None) -> Observer:
     One triangular factor serves all lengths: the rows of its last columns below the columns of a length
     are the prediction errors left at that length. With noise, the length is twice the one that minimizes
     Akaike's corrected criterion, which is made for the next sample; poles profit from a longer look back.
-    Without noise any length that is long enough is exact, and the longer it is the better conditioned.
+    Without noise any length that is long enough is exact, and the longest is the best conditioned.
 
     Args:
         recording: one or more records with inputs; records of kind pulse or impact are taken to start
@@ -86,6 +86,7 @@ def observe(recording: Recording, *, observer: int | None = None) -> Observer:
     Raises:
         RecordingError: no inputs, a missing sample, or a channel that is zero throughout.
         TooShortError: too few samples.
+        IdentificationError: the length asked for is less than one.
 
     Source: Juang, Phan, Horta and Longman (1993), J. Guidance 16(2), without the assumption of rest;
     the criterion is that of Hurvich and Tsai (1989), Biometrika 76(2), for several outputs.
@@ -94,6 +95,8 @@ def observe(recording: Recording, *, observer: int | None = None) -> Observer:
     scale = rms(recording)
     n_inputs, n_outputs = len(recording.inputs), len(recording.outputs)
     width = n_inputs + n_outputs
+    if observer is not None and observer < 1:
+        raise IdentificationError(f"the observer looks back {observer} samples; expected at least one")
     longest = _longest(recording) if observer is None else observer
     R, n_rows = _factor(recording, scale, longest)
     split = n_inputs + longest * width
@@ -190,11 +193,10 @@ def _choose(errors: Array, n_rows: int, width: int, exact: bool) -> tuple[int, s
     lengths = np.arange(1, longest + 1)
     if exact:
         enough = int(np.argmax(np.trace(errors, axis1=1, axis2=2) < n_outputs * 1e-18)) + 1
-        p = min(10 * enough, longest)
-        return (
-            p,
-            f"The observer looks back {p} samples: {enough} leave no error, and more improve the "
-            f"conditioning.",
+        return longest, (
+            f"The observer looks back {longest} samples: without noise {enough} are enough, and more "
+            f"improve the "
+            "conditioning."
         )
     n_columns = lengths * width
     # The floor keeps the determinant finite where two outputs read the same.

@@ -137,6 +137,18 @@ def test_mixed_measurements_from_general_forces():
     np.testing.assert_allclose(matrices.stiffness, structure.stiffness, atol=1e-8)
 
 
+@pytest.mark.parametrize("quantity", ["displacement", "acceleration"])
+def test_fast_sampling_is_exact_too(quantity):
+    # 600 samples per period of the slowest mode: successive rows of the regression are nearly equal.
+    structure = systems.chain3("coupled")
+    system = systems.instrumented(
+        structure, systems.sensors(["x2", "x3"], quantity), systems.actuators(["x1", "x2"])
+    )
+    found = okid_era(random_recording(system.sampled(0.005), 4000))
+    matrices = second_order(found.system, dofs=structure.dofs)
+    np.testing.assert_allclose(matrices.stiffness, structure.stiffness, rtol=0, atol=1e-8)
+
+
 def test_impact_records_start_from_rest():
     u = np.zeros((2, 400))
     u[0, :3] = [0.3, 1.0, 0.4]
@@ -187,7 +199,7 @@ def test_error_falls_with_the_root_of_the_length():
 
 
 def test_further_orders_come_from_the_same_decomposition():
-    found = okid_era(random_recording(CHAIN3, 1500), 6, orders=(2, 4))
+    found = okid_era(random_recording(CHAIN3, 1500), 6, orders=(2, 4), observer=30)
     assert found.orders == (2, 4, 6)
     assert found.settings["observer"] == 30
 
@@ -306,6 +318,11 @@ def test_too_few_samples_are_counted():
         okid(random_recording(CHAIN3, 15))
     with pytest.raises(TooShortError, match="length 20 has 82 coefficients per output for 80 samples"):
         okid(random_recording(CHAIN3, 100), observer=20)
+
+
+def test_an_observer_of_no_length_is_refused():
+    with pytest.raises(IdentificationError, match="looks back 0 samples"):
+        okid(random_recording(CHAIN3, 100), observer=0)
 
 
 def test_an_observer_that_grows_is_refused():
