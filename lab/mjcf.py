@@ -59,7 +59,7 @@ def compiled(xml: str, folder: Path | None, source: str) -> mujoco.MjModel:
     """
     with quiet():
         try:
-            spec = mujoco.MjSpec.from_string(xml)
+            spec = mujoco.MjSpec.from_string(xml if folder is None else _with_anchored_models(xml, folder))
             if folder is not None:
                 spec.modelfiledir = str(folder)
             return spec.compile()
@@ -80,9 +80,41 @@ def quiet() -> Iterator[list[str]]:
         mujoco.set_mju_user_warning(before)
 
 
+def anchor(root: ET.Element, folder: Path) -> None:
+    """Makes the paths of all files absolute that a model in `folder` names, so that its text can go elsewhere."""
+    _anchor_models(root, folder)
+    if not root.findall(".//*[@file]"):
+        return
+    where = {"meshdir": "", "texturedir": ""}
+    compilers = root.findall("compiler") or [ET.Element("compiler")]
+    for compiler in compilers:
+        shared = compiler.attrib.pop("assetdir", None)
+        for key in where:
+            given = compiler.attrib.pop(key, shared)
+            where[key] = where[key] if given is None else given
+    if root.find("compiler") is None:
+        root.insert(0, compilers[0])
+    for key, value in where.items():
+        compilers[-1].set(key, str(folder / value))
+
+
 def number(value: float) -> str:
     """A number that reads back to the same double."""
     return repr(float(value))
+
+
+def _with_anchored_models(xml: str, folder: Path) -> str:
+    """The text with absolute paths of sub-models, which MuJoCo reads before it can be told the folder."""
+    if "<model" not in xml:
+        return xml
+    root = parse(xml)
+    _anchor_models(root, folder)
+    return to_text(root)
+
+
+def _anchor_models(root: ET.Element, folder: Path) -> None:
+    for model in root.iterfind("asset/model[@file]"):
+        model.set("file", str(folder / model.get("file", "")))
 
 
 def _text(path: Path) -> str:
