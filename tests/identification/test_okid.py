@@ -186,6 +186,7 @@ def test_five_per_cent_noise(model, order):
     assert response_error(found.system, model) < 0.04
 
 
+@pytest.mark.slow
 def test_error_falls_with_the_root_of_the_length():
     errors = []
     for n_samples in (4000, 16_000):
