@@ -73,7 +73,12 @@ class Modes:
             None if std is None else std[keep] for std in (self.frequency_std, self.damping_std)
         )
         return Modes(
-            self.frequency_hz[keep], self.damping_ratio[keep], self.shapes[:, keep], self.outputs, frequency_std, damping_std
+            self.frequency_hz[keep],
+            self.damping_ratio[keep],
+            self.shapes[:, keep],
+            self.outputs,
+            frequency_std,
+            damping_std,
         )
 
     def normalized(self) -> Modes:
@@ -86,7 +91,10 @@ class Modes:
         )
 
     def __repr__(self) -> str:
-        listed = ", ".join(f"{f:.4g} Hz ({100 * z:.3g} %)" for f, z in zip(self.frequency_hz, self.damping_ratio, strict=True))
+        listed = ", ".join(
+            f"{f:.4g} Hz ({100 * z:.3g} %)"
+            for f, z in zip(self.frequency_hz, self.damping_ratio, strict=True)
+        )
         return f"Modes({listed or 'none'})"
 
 
@@ -104,9 +112,11 @@ def mac(a: Complex, b: Complex) -> Array:
     """
     a, b = np.asarray(a), np.asarray(b)
     if a.shape[0] != b.shape[0]:
-        raise IdentificationError(f"shapes have {a.shape[0]} and {b.shape[0]} outputs; expected the same outputs in both")
+        raise IdentificationError(
+            f"shapes have {a.shape[0]} and {b.shape[0]} outputs; expected the same outputs in both"
+        )
     squared = np.outer(np.sum(np.abs(a) ** 2, axis=0), np.sum(np.abs(b) ** 2, axis=0))
-    return np.abs(a.conj().T @ b) ** 2 / np.where(squared == 0, 1, squared)
+    return np.asarray(np.abs(a.conj().T @ b) ** 2 / np.where(squared == 0, 1, squared))
 
 
 def modal_phase_collinearity(shapes: Complex) -> Array:

@@ -86,7 +86,7 @@ class Channel:
 
     @property
     def quantity(self) -> str:
-        """What the channel measures: displacement, velocity, acceleration, force, …"""
+        """What the channel measures, such as displacement, velocity, acceleration or force."""
         return QUANTITIES[self.unit]
 
 
@@ -146,7 +146,10 @@ class Record:
         for start in range(0, self.n_samples, size):
             stop = min(start + size, self.n_samples)
             inputs = self.inputs[:, start:stop] if self.inputs.shape[0] else np.zeros((0, stop - start))
-            yield np.asarray(inputs, dtype=np.float64), np.asarray(self.outputs[:, start:stop], dtype=np.float64)
+            yield (
+                np.asarray(inputs, dtype=np.float64),
+                np.asarray(self.outputs[:, start:stop], dtype=np.float64),
+            )
 
     def __repr__(self) -> str:
         return (
@@ -254,7 +257,9 @@ class Recording:
                     f"{record.n_samples / self.sample_rate} s"
                 )
             inputs = record.inputs[:, a:b] if record.inputs.shape[0] else record.inputs
-            records.append(replace(record, inputs=np.asarray(inputs), outputs=np.asarray(record.outputs[:, a:b])))
+            records.append(
+                replace(record, inputs=np.asarray(inputs), outputs=np.asarray(record.outputs[:, a:b]))
+            )
         return replace(self, records=tuple(records))
 
     def require_complete(self) -> None:
@@ -299,7 +304,9 @@ def _rows(
     rows = []
     for name in names:
         if name not in position:
-            raise RecordingError(f"{side} channel {name!r} does not exist; there are {', '.join(position) or 'none'}")
+            raise RecordingError(
+                f"{side} channel {name!r} does not exist; there are {', '.join(position) or 'none'}"
+            )
         rows.append(position[name])
     return rows, tuple(channels[row] for row in rows)
 
