@@ -1,0 +1,288 @@
+"""What an experiment can tell: Fisher information, the Cramér-Rao bound, and what follows for M, C, K and modes."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+import scipy.linalg
+from numpy.typing import ArrayLike
+
+from identification.errors import IdentificationError
+from identification.families import Model, family
+from identification.modes import Modes
+from identification.output_error import OutputError, output_error, simulated
+from identification.parameterizations import Parameterization, Tangent
+from identification.recording import Array, Channel, Record, Recording
+from identification.scoring import Curvature
+from identification.structures import LinearStructure, Structure, StructureTangent
+from identification.systems import SecondOrder
+
+NOTHING = 1e-5
+"""Relative share below which a combination of parameters has no part in something."""
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class Bound:
+    """The least scatter that an unbiased estimate from an experiment can have.
+
+    Attributes:
+        names: one per parameter.
+        values: the parameters, shape (n_parameters,).
+        covariance: of the parameters, shape (n_parameters, n_parameters), along what the experiment sees.
+        blind: combinations of parameters that it does not see, in columns, shape (n_parameters, n_blind).
+        second_order: the structure with standard deviations; None where the model has no M, C, K.
+        modes: the modes at the outputs with standard deviations.
+    """
+
+    names: tuple[str, ...]
+    values: Array
+    covariance: Array
+    blind: Array
+    second_order: SecondOrder | None
+    modes: Modes
+
+    @property
+    def std(self) -> Array:
+        """Standard deviation of each parameter, infinite where the experiment is blind for it."""
+        return delta_method(self.covariance, np.eye(len(self.names)), blind=self.blind)
+
+    def __repr__(self) -> str:
+        return f"Bound({len(self.names)} parameters, {self.blind.shape[1]} combinations not identifiable)"
+
+
+def fisher_information(
+    model: Model,
+    recording: Recording,
+    *,
+    noise_std: ArrayLike,
+    parameterization: Parameterization | None = None,
+    initial_state: str = "auto",
+    initial_states: Sequence[Array] | None = None,
+) -> Array:
+    """What the experiment tells about the parameters, unknown initial states being eliminated.
+
+    Args:
+        model: the truth, as far as it is known: M, C, K, a state space, or parameters.
+        recording: inputs, channels and sample rate, done or only planned: the outputs do not matter.
+        noise_std: of the outputs, a number or shape (n_outputs,) or (n_records, n_outputs).
+        parameterization: all entries of M, C, K when None, or poles, shapes and participation of a state space.
+        initial_state: `rest`, `free`, or `auto` for free in free decays only.
+        initial_states: true states at the first samples of the records that begin with unknown ones.
+
+    Returns:
+        Shape (n_parameters, n_parameters), in one over the product of the units of the two parameters.
+
+    Raises:
+        IdentificationError: the model, the noise or the initial states do not fit the recording.
+
+    Source: Kay (1993), Fundamentals of Statistical Signal Processing I, eq. (3.31), for noise that is Gaussian,
+    white and of known size; not knowing the size takes nothing away.
+    """
+    problem, q, weights = _experiment(
+        model, recording, noise_std, parameterization, initial_state, initial_states
+    )
+    _, information = problem.normal_equations(q, weights)
+    n = problem.n_theta
+    own, cross, rest = information[:n, :n], information[:n, n:], information[n:, n:]
+    lost = (
+        np.stack([Curvature.of(rest).solve(column) for column in cross], axis=1) if rest.size else 0 * cross.T
+    )
+    return np.asarray(own - cross @ lost)
+
+
+def cramer_rao_bound(
+    model: Model,
+    recording: Recording,
+    *,
+    noise_std: ArrayLike,
+    parameterization: Parameterization | None = None,
+    initial_state: str = "auto",
+    initial_states: Sequence[Array] | None = None,
+) -> Bound:
+    """The least standard deviations of parameters, M, C, K and modes that the experiment allows.
+
+    Args:
+        model, recording, noise_std, parameterization, initial_state, initial_states: as for
+            `fisher_information`.
+
+    Returns:
+        The bound; infinite for what the experiment does not identify.
+
+    Raises:
+        IdentificationError: as for `fisher_information`.
+
+    Source: Kay (1993), eq. (3.20) and, for functions of the parameters, (3.30).
+    """
+    problem, q, weights = _experiment(
+        model, recording, noise_std, parameterization, initial_state, initial_states
+    )
+    _, information = problem.normal_equations(q, weights)
+    covariance, blind = covariance_of(information, problem.n_theta)
+    structure, modes = spread(problem, q, covariance, blind)
+    return Bound(problem.parameterization.names, q[: problem.n_theta], covariance, blind, structure, modes)
+
+
+def predict(
+    model: Model,
+    recording: Recording,
+    *,
+    parameterization: Parameterization | None = None,
+    initial_states: Sequence[Array] | None = None,
+) -> Recording:
+    """The recording with the outputs that the model gives under its inputs, without noise.
+
+    Args:
+        model, parameterization: as for `fisher_information`.
+        recording: inputs, channels and sample rate.
+        initial_states: states at the first samples, one per record; rest when None.
+    """
+    state = "rest" if initial_states is None else "free"
+    problem, q, _ = _experiment(model, recording, 1.0, parameterization, state, initial_states)
+    outputs = simulated(problem.tangent(q).system, problem.runs, problem.initial(q))
+    records = [replace(record, outputs=y) for record, y in zip(recording.records, outputs, strict=True)]
+    return replace(recording, records=tuple(records))
+
+
+def planned(
+    signals: Sequence[Array],
+    inputs: Sequence[Channel],
+    outputs: Sequence[Channel],
+    *,
+    sample_rate: float,
+    kind: str = "other",
+) -> Recording:
+    """A test that has not been done yet, as a recording without responses.
+
+    Args:
+        signals: inputs of each record, shape (n_inputs, n_samples).
+        inputs: input channels.
+        outputs: output channels.
+        sample_rate: [Hz].
+        kind: of all records, such as `pulse` or `random`.
+
+    Returns:
+        Inputs as planned, outputs zero: for `fisher_information`, `cramer_rao_bound` and `predict`.
+    """
+    records = tuple(Record(kind, u, np.zeros((len(outputs), np.shape(u)[1]))) for u in signals)
+    return Recording(records, tuple(inputs), tuple(outputs), sample_rate)
+
+
+def delta_method(covariance: Array, jacobian: Array, *, blind: Array | None = None) -> Array:
+    """Standard deviation of functions of parameters, to first order, shape (n_functions,).
+
+    Args:
+        covariance: of the parameters, shape (n_parameters, n_parameters).
+        jacobian: derivative of each function, shape (n_functions, n_parameters).
+        blind: combinations of parameters that are not known at all, in columns; a function that one of them
+            changes has an infinite standard deviation.
+
+    Source: Kay (1993), eq. (3.30).
+    """
+    variance = np.einsum("fp,pq,fq->f", jacobian, covariance, jacobian, optimize=True)
+    std = np.sqrt(np.maximum(variance, 0.0))
+    if blind is None or not blind.shape[1]:
+        return np.asarray(std)
+    change, size = np.abs(jacobian @ blind), np.abs(jacobian) @ np.abs(blind)
+    return np.asarray(np.where(np.any(change > NOTHING * size, axis=1), np.inf, std))
+
+
+def covariance_of(information: Array, n_parameters: int) -> tuple[Array, Array]:
+    """Covariance of the first parameters along what the data see, and what they do not see, in columns.
+
+    Args:
+        information: Fisher information of all unknowns, shape (n_unknowns, n_unknowns).
+        n_parameters: how many of them matter; the others are eliminated.
+
+    Returns:
+        Shapes (n_parameters, n_parameters) and (n_parameters, n_blind).
+    """
+    curvature = Curvature.of(information)
+    seen, V = curvature.seen, curvature.eigenvectors[:n_parameters]
+    rows = V / curvature.scale[:n_parameters, None]
+    covariance = (rows[:, seen] / curvature.eigenvalues[seen]) @ rows[:, seen].T
+    blind = np.where(np.abs(V) > NOTHING, rows, 0.0)[:, ~seen]
+    return covariance, blind[:, np.any(blind, axis=0)]
+
+
+def spread(
+    problem: OutputError, q: Array, covariance: Array, blind: Array
+) -> tuple[SecondOrder | None, Modes]:
+    """M, C, K (None where the family has none) and the modes at q, with standard deviations.
+
+    Args:
+        problem: the fitting problem.
+        q: unknowns.
+        covariance: of the parameters.
+        blind: combinations of parameters that are not known at all, in columns.
+    """
+    theta, family_of_models = q[: problem.n_theta], problem.parameterization
+    structure = None
+    if isinstance(family_of_models, LinearStructure | Structure):
+        structure = _structure_with_std(family_of_models.matrices(theta), covariance, blind)
+    return structure, modes_with_std(problem.tangent(q), covariance, blind=blind)
+
+
+def modes_with_std(tangent: Tangent, covariance: Array, *, blind: Array | None = None) -> Modes:
+    """Modes of a model with the standard deviations of their frequencies and damping ratios.
+
+    Args:
+        tangent: the model and its derivatives with respect to the parameters.
+        covariance: of the parameters, shape (n_parameters, n_parameters).
+        blind: as for `delta_method`.
+
+    Source: first-order perturbation of a simple eigenvalue, ∂λ = wᴴ ∂A v / wᴴ v.
+    """
+    system = tangent.system
+    modes = system.modes()
+    poles, left, right = scipy.linalg.eig(system.A, left=True, right=True)
+    moved = np.einsum("ai,pab,bi->ip", left.conj(), tangent.A_theta, right, optimize=True)
+    moved /= np.sum(left.conj() * right, axis=0)[:, None]
+    if system.dt:
+        moved, poles = moved / (poles[:, None] * system.dt), np.log(poles.astype(complex)) / system.dt
+    pick = [int(np.argmin(np.abs(poles - pole))) for pole in modes.poles]
+    pole, moved, omega = poles[pick, None], moved[pick], np.abs(poles[pick, None])
+    d_omega = np.real(pole.conj() * moved) / omega
+    d_zeta = -np.real(moved) / omega + np.real(pole) * d_omega / omega**2
+    return replace(
+        modes,
+        frequency_std=delta_method(covariance, d_omega / (2 * np.pi), blind=blind),
+        damping_std=delta_method(covariance, d_zeta, blind=blind),
+    )
+
+
+def _structure_with_std(tangent: StructureTangent, covariance: Array, blind: Array) -> SecondOrder:
+    shape = tangent.structure.mass.shape
+    M, C, K = (
+        delta_method(covariance, d.reshape(len(d), -1).T, blind=blind).reshape(shape)
+        for d in (tangent.M_theta, tangent.C_theta, tangent.K_theta)
+    )
+    return replace(tangent.structure, mass_std=M, damping_std=C, stiffness_std=K)
+
+
+def _experiment(
+    model: Model,
+    recording: Recording,
+    noise_std: ArrayLike,
+    parameterization: Parameterization | None,
+    initial_state: str,
+    initial_states: Sequence[Array] | None,
+) -> tuple[OutputError, Array, Array]:
+    """The fitting problem, the unknowns and the weights of each record and output."""
+    parameterization, theta = family(model, recording, parameterization)
+    problem = output_error(recording, parameterization, theta, initial_state=initial_state)
+    shape = (len(problem.runs), len(problem.outputs))
+    std = np.asarray(noise_std, dtype=float)
+    if std.shape not in ((), shape[1:], shape) or not np.all((std > 0) & np.isfinite(std)):
+        raise IdentificationError(
+            f"noise_std is {std.tolist()}; expected positive numbers, one, {shape[1]} or {shape[0]} x {shape[1]}"
+        )
+    states = [] if initial_states is None else [np.asarray(x, dtype=float) for x in initial_states]
+    wanted = [(problem.n_states,)] * sum(problem.released)
+    if [x.shape for x in states] != wanted:
+        raise IdentificationError(
+            f"initial_states are {len(states)} of shapes {[x.shape for x in states]}; expected {len(wanted)} of "
+            f"{problem.n_states} states, one for each record that begins with an unknown one"
+        )
+    return problem, np.concatenate([theta, *states]), np.broadcast_to(std**-2.0, shape)

@@ -1,0 +1,169 @@
+"""The difference between measured and simulated outputs, as a function of the parameters.
+
+The unknowns q are θ and, for each record that does not begin at rest, the state at its first sample.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from identification import cascade, modal_responses
+from identification.errors import RecordingError
+from identification.modal_responses import Run
+from identification.parameterizations import Parameterization, Tangent
+from identification.recording import Array, Channel, Recording
+from identification.systems import StateSpace
+
+MAX_GROWTH = 200.0
+"""Largest exponent by which a response may grow over a record: its square must stay a finite number."""
+
+
+@dataclass(frozen=True, eq=False)
+class OutputError:
+    """Records and the family of models that shall explain them.
+
+    Attributes:
+        parameterization: the family.
+        inputs, outputs: channels.
+        runs: the records.
+        released: whether each one begins from an unknown state.
+        n_states: states of the model.
+    """
+
+    parameterization: Parameterization
+    inputs: tuple[Channel, ...]
+    outputs: tuple[Channel, ...]
+    runs: tuple[Run, ...]
+    released: tuple[bool, ...]
+    n_states: int
+
+    @property
+    def n_theta(self) -> int:
+        """Number of parameters, initial states aside."""
+        return len(self.parameterization.names)
+
+    @property
+    def n_unknowns(self) -> int:
+        """Number of parameters and initial states."""
+        return self.n_theta + self.n_states * sum(self.released)
+
+    @property
+    def n_samples(self) -> Array:
+        """Samples of each record, shape (n_records, 1)."""
+        return np.array([[float(run.outputs.shape[1])] for run in self.runs])
+
+    def initial(self, q: Array) -> list[Array | None]:
+        """The initial state of each record, None for rest."""
+        states = iter(q[self.n_theta :].reshape(-1, self.n_states))
+        return [next(states) if released else None for released in self.released]
+
+    def tangent(self, q: Array) -> Tangent:
+        """The model at q with its derivatives.
+
+        Raises:
+            numpy.linalg.LinAlgError: there is no such model.
+        """
+        return self.parameterization.tangent(q[: self.n_theta], self.inputs, self.outputs)
+
+    def squares(self, q: Array) -> Array | None:
+        """Sum of squared errors of each record and output, (n_records, n_outputs); None where no model exists."""
+        try:
+            system = self.tangent(q).system
+            if not self._bounded(system):
+                return None
+        except np.linalg.LinAlgError:
+            return None
+        predictions = simulated(system, self.runs, self.initial(q))
+        return np.stack(
+            [np.sum((run.outputs - y) ** 2, axis=1) for run, y in zip(self.runs, predictions, strict=True)]
+        )
+
+    def normal_equations(self, q: Array, weights: Array) -> tuple[Array, Array]:
+        """Jᵀ W e, shape (n_unknowns,), and the Fisher information Jᵀ W J.
+
+        Args:
+            q: unknowns, shape (n_unknowns,).
+            weights: one over the noise variance of each record and output, shape (n_records, n_outputs).
+        """
+        tangent = self.tangent(q)
+        modes = modal_responses.spectrum(tangent.system)
+        gradient, information = np.zeros(self.n_unknowns), np.zeros((self.n_unknowns, self.n_unknowns))
+        first = self.n_theta
+        for run, initial, w in zip(self.runs, self.initial(q), weights, strict=True):
+            if modes is None:
+                g, H = cascade.normal_equations(tangent, run, initial, w)
+            else:
+                g, H = modal_responses.normal_equations(tangent, modes, run, initial, w)
+            rows = np.arange(len(g))
+            rows[self.n_theta :] += first - self.n_theta
+            gradient[rows] += g
+            information[np.ix_(rows, rows)] += H
+            first += len(g) - self.n_theta
+        return gradient, information
+
+    def _bounded(self, system: StateSpace) -> bool:
+        """Whether no response grows beyond all numbers within a record."""
+        poles = np.linalg.eigvals(system.A)
+        longest = np.max(self.n_samples)
+        size = np.maximum(np.abs(poles), np.finfo(float).tiny)
+        rate = np.log(size) if system.dt else poles.real * self.runs[0].dt
+        return bool(np.all(np.isfinite(poles)) and np.max(rate) * longest < MAX_GROWTH)
+
+
+def output_error(
+    recording: Recording,
+    parameterization: Parameterization,
+    theta: Array,
+    *,
+    initial_state: str = "auto",
+) -> OutputError:
+    """The fitting problem of a recording.
+
+    Args:
+        recording: records with inputs, or free decays.
+        parameterization: the family of models.
+        theta: any parameters in it, to see how many states it has.
+        initial_state: `rest`, `free`, or `auto` for free in free decays only.
+
+    Raises:
+        RecordingError: samples are missing, a record has neither inputs nor a free initial state, the model is
+            sampled at another rate, or `initial_state` is unknown.
+    """
+    if initial_state not in ("auto", "rest", "free"):
+        raise RecordingError(f"initial_state is {initial_state!r}; expected auto, rest or free")
+    recording.require_complete()
+    released = tuple(
+        initial_state == "free" or (initial_state == "auto" and record.kind == "free_decay")
+        for record in recording.records
+    )
+    runs = []
+    for number, (record, free) in enumerate(zip(recording.records, released, strict=True)):
+        inputs = np.asarray(record.inputs[:, :], dtype=float) if record.inputs.shape[0] else None
+        if inputs is None and not free:
+            raise RecordingError(
+                f"record {number} of kind {record.kind} has no measured inputs, so a simulation stays at rest; "
+                "expected inputs, or a free decay; use an output-only method"
+            )
+        active = np.flatnonzero(np.any(inputs, axis=1)) if inputs is not None else np.zeros(0, dtype=np.intp)
+        forces = inputs[active] if inputs is not None else np.zeros((0, record.n_samples))
+        runs.append(Run(forces, active, np.asarray(record.outputs[:, :], dtype=float), recording.dt))
+    system = parameterization.tangent(theta, recording.inputs, recording.outputs).system
+    if system.dt and abs(system.dt / recording.dt - 1) > 1e-9:
+        raise RecordingError(
+            f"the recording has {recording.sample_rate:g} Hz and the start is sampled at {1 / system.dt:g} Hz; "
+            "give a start of the same rate, or a continuous one"
+        )
+    return OutputError(
+        parameterization, recording.inputs, recording.outputs, tuple(runs), released, system.n_states
+    )
+
+
+def simulated(system: StateSpace, runs: Sequence[Run], initial: Sequence[Array | None]) -> list[Array]:
+    """Outputs of each run, shape (n_outputs, n_samples)."""
+    modes = modal_responses.spectrum(system)
+    if modes is None:
+        return [cascade.simulate(system, run, x0) for run, x0 in zip(runs, initial, strict=True)]
+    return [modal_responses.simulate(system, modes, run, x0) for run, x0 in zip(runs, initial, strict=True)]

@@ -1,0 +1,184 @@
+"""The maximum of a likelihood by Fisher scoring: Gauss-Newton steps, shortened where they do not help.
+
+Each record and output has noise of its own, unknown size. At its best value the log-likelihood is
+-½ Σ N ln(squares / N), and its expected curvature is the Fisher information at that noise.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from identification.errors import IdentificationError
+from identification.output_error import OutputError
+from identification.recording import Array
+
+TOLERANCE = 1e-8
+"""Squared distance to the maximum, in standard deviations, at which to stop."""
+
+GOOD_ENOUGH = 1e-4
+"""The same, at which to be content when rounding allows no further step."""
+
+PRECISION = 1e-10
+"""Noise relative to the signal below which data count as exact; keeps weights finite."""
+
+BLIND = 1e-11
+"""Information of a combination of scaled parameters below which rounding decides, relative to the largest."""
+
+MAX_DAMPING = 1e8
+
+
+@dataclass(frozen=True, eq=False)
+class Noise:
+    """How noise variances follow from squared errors.
+
+    Attributes:
+        n_samples: samples of each record, shape (n_records, 1).
+        floor: smallest variance, shape (n_records, n_outputs).
+        per_record: whether each record has its own, or all share one for each output.
+    """
+
+    n_samples: Array
+    floor: Array
+    per_record: bool
+
+    def variance(self, squares: Array) -> Array:
+        """Variance of each record and output, shape (n_records, n_outputs)."""
+        if self.per_record:
+            return squares / self.n_samples + self.floor
+        pooled = np.sum(squares + self.n_samples * self.floor, axis=0) / np.sum(self.n_samples)
+        return np.broadcast_to(pooled, squares.shape)
+
+    def cost(self, squares: Array | None) -> float:
+        """Minus the log-likelihood, but for a constant; infinite where no model exists."""
+        if squares is None or not np.all(np.isfinite(squares)):
+            return np.inf
+        return float(0.5 * np.sum(self.n_samples * np.log(self.variance(squares))))
+
+
+@dataclass(frozen=True, eq=False)
+class Optimum:
+    """Where the search ended.
+
+    Attributes:
+        q: the unknowns.
+        squares: squared errors there, shape (n_records, n_outputs).
+        information: Fisher information there, shape (n_unknowns, n_unknowns).
+        n_iterations: Gauss-Newton steps taken.
+        distance: to the maximum, in standard deviations, by the last step computed.
+        converged: whether this is as good as zero.
+    """
+
+    q: Array
+    squares: Array
+    information: Array
+    n_iterations: int
+    distance: float
+    converged: bool
+
+
+@dataclass(frozen=True, eq=False)
+class Curvature:
+    """An information matrix in the coordinates in which its diagonal is one.
+
+    Attributes:
+        scale: square roots of its diagonal, one where that is zero.
+        eigenvalues: of the scaled matrix, rising.
+        eigenvectors: of the scaled matrix, in columns.
+    """
+
+    scale: Array
+    eigenvalues: Array
+    eigenvectors: Array
+
+    @classmethod
+    def of(cls, information: Array) -> Curvature:
+        """The decomposition."""
+        scale = np.sqrt(np.diag(information))
+        scale = np.where(scale > 0, scale, 1.0)
+        return cls(scale, *np.linalg.eigh(information / scale / scale[:, None]))
+
+    @property
+    def seen(self) -> NDArray[np.bool_]:
+        """Which eigenvectors the data say something about."""
+        return np.asarray(self.eigenvalues > BLIND * self.eigenvalues[-1])
+
+    def solve(self, gradient: Array, damping: float = 0.0) -> Array:
+        """(H + damping · diag H)⁻¹ g, and nothing where the data are blind."""
+        along = self.eigenvectors.T @ (gradient / self.scale)
+        length = np.where(self.seen, along / np.where(self.seen, self.eigenvalues + damping, 1.0), 0.0)
+        return np.asarray(self.eigenvectors @ length / self.scale)
+
+
+def noise_model(problem: OutputError, *, per_record: bool) -> Noise:
+    """The noise of a problem, with a floor relative to the size of each signal."""
+    power = np.stack([np.mean(run.outputs**2, axis=1) for run in problem.runs])
+    if not np.any(power):
+        raise IdentificationError("all outputs are zero, so there is nothing to fit; check the recording")
+    power = np.where(power > 0, power, np.max(power))
+    return Noise(problem.n_samples, PRECISION**2 * power, per_record)
+
+
+def maximize(problem: OutputError, noise: Noise, start: Array, *, max_iterations: int = 100) -> Optimum:
+    """The most likely unknowns near the start.
+
+    Args:
+        problem: records and family of models.
+        noise: noise model.
+        start: unknowns to begin with, shape (n_unknowns,).
+        max_iterations: steps after which to give up.
+
+    Raises:
+        IdentificationError: the model of the start cannot be simulated.
+
+    Source: Osborne (1992), Int. Stat. Rev. 60(1), Fisher's method of scoring; Marquardt (1963), J. SIAM 11(2),
+    for the damping.
+    """
+    q, squares = start, problem.squares(start)
+    cost = noise.cost(squares)
+    if squares is None or not np.isfinite(cost):
+        raise IdentificationError(
+            "the model of the start grows beyond all bounds within a record or has a singular mass matrix; "
+            "start from a stable model"
+        )
+    damping, iteration = 0.0, 0
+    while True:
+        gradient, information = problem.normal_equations(q, 1 / noise.variance(squares))
+        curvature = Curvature.of(information)
+        distance2 = float(gradient @ curvature.solve(gradient))
+        done = distance2 < TOLERANCE
+        if done or iteration == max_iterations:
+            break
+        trial = None
+        while trial is None and damping < MAX_DAMPING:
+            step = curvature.solve(gradient, damping)
+            trial = problem.squares(q + step)
+            gain = cost - noise.cost(trial)
+            if trial is None or not gain > 0:
+                trial, damping = None, max(10 * damping, 1e-4)
+        if trial is None:
+            done = distance2 < GOOD_ENOUGH
+            break
+        expected = gradient @ step - 0.5 * step @ information @ step
+        if gain > 0.5 * expected:
+            damping = damping / 10 if damping > 1e-5 else 0.0
+        q, squares, cost, iteration = q + step, trial, cost - gain, iteration + 1
+    return Optimum(q, squares, information, iteration, float(np.sqrt(max(distance2, 0.0))), done)
+
+
+def solve_linear(problem: OutputError, start: Array, which: NDArray[np.bool_]) -> Array:
+    """The start with those unknowns at their best on which the outputs depend linearly.
+
+    Args:
+        problem: records and family of models.
+        start: unknowns, shape (n_unknowns,).
+        which: mask of the linear ones.
+    """
+    power = np.stack([np.mean(run.outputs**2, axis=1) for run in problem.runs])
+    weights = 1 / np.where(power > 0, power, np.max(power))
+    gradient, information = problem.normal_equations(start, weights)
+    best = start.copy()
+    best[which] += Curvature.of(information[np.ix_(which, which)]).solve(gradient[which])
+    return best

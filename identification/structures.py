@@ -1,0 +1,288 @@
+"""Structures whose mass, damping and stiffness depend on parameters: free matrices, networks of springs."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+import scipy.linalg
+
+from identification.errors import IdentificationError, NotSecondOrderError
+from identification.parameterizations import Tangent, start_values
+from identification.recording import DERIVATIVE, Array, Channel, frozen
+from identification.second_order import second_order
+from identification.systems import Realization, SecondOrder, StateSpace
+
+WORLD = "world"
+"""The ground that a spring or dashpot may hold on to."""
+
+Element = tuple[str, str] | Mapping[str, float]
+"""What a spring or dashpot spans: two DOF (or one and `WORLD`), or the row that gives its extension."""
+
+
+@dataclass(frozen=True, eq=False)
+class StructureTangent:
+    """Mass, damping and stiffness, and how they move with each parameter.
+
+    Attributes:
+        structure: the matrices at θ.
+        M_theta, C_theta, K_theta: their derivatives, shape (n_parameters, n_dofs, n_dofs).
+    """
+
+    structure: SecondOrder
+    M_theta: Array
+    C_theta: Array
+    K_theta: Array
+
+    def instrumented(self, inputs: Sequence[Channel], outputs: Sequence[Channel]) -> Tangent:
+        """The state space seen through these channels, with its derivatives.
+
+        Raises:
+            NotSecondOrderError: a channel neither drives nor reads the motion of a known degree of freedom.
+
+        Source: De Angelis et al. (2002), J. Appl. Mech. 69, eq. (1) and (7), differentiated.
+        """
+        s = self.structure
+        B, C_p, C_v, C_a = channel_matrices(s.dofs, inputs, outputs)
+        W = scipy.linalg.inv(s.mass)
+        WB, WC, WK = W @ B, W @ s.damping, W @ s.stiffness
+        # ∂(M⁻¹ X) = M⁻¹ (∂X - ∂M M⁻¹ X)
+        dWB, dWC, dWK = (
+            W @ (-self.M_theta @ WB),
+            W @ (self.C_theta - self.M_theta @ WC),
+            W @ (self.K_theta - self.M_theta @ WK),
+        )
+        n, p = len(s.dofs), len(self.M_theta)
+        zero = np.zeros((n, n))
+        system = StateSpace(
+            np.block([[zero, np.eye(n)], [-WK, -WC]]),
+            np.vstack([np.zeros_like(WB), WB]),
+            np.hstack([C_p - C_a @ WK, C_v - C_a @ WC]),
+            C_a @ WB,
+            0.0,
+            tuple(inputs),
+            tuple(outputs),
+        )
+        dA = np.zeros((p, 2 * n, 2 * n))
+        dA[:, n:, :n], dA[:, n:, n:] = -dWK, -dWC
+        dB = np.concatenate([np.zeros_like(dWB), dWB], axis=1)
+        dC = np.concatenate([-C_a @ dWK, -C_a @ dWC], axis=2)
+        return Tangent(system, dA, dB, dC, C_a @ dWB)
+
+
+@dataclass(frozen=True, eq=False)
+class Structure:
+    """M, C_d and K as any smooth function of parameters, such as those of a model file.
+
+    Attributes:
+        names: one per parameter.
+        matrices: θ, shape (n_parameters,), to the matrices and their derivatives.
+    """
+
+    names: tuple[str, ...]
+    matrices: Callable[[Array], StructureTangent]
+
+    def start(self, model: Any) -> Array:
+        """The start values as they are."""
+        return start_values(model, self.names)
+
+    def tangent(self, theta: Array, inputs: Sequence[Channel], outputs: Sequence[Channel]) -> Tangent:
+        """The state space at θ seen through these channels, with its derivatives."""
+        return self.matrices(theta).instrumented(inputs, outputs)
+
+
+@dataclass(frozen=True, eq=False)
+class LinearStructure:
+    """M, C_d and K as sums of known patterns, each times one parameter, on top of known matrices.
+
+    Attributes:
+        names: one per parameter.
+        known: what does not depend on the parameters.
+        mass, damping, stiffness: the pattern of each parameter, shape (n_parameters, n_dofs, n_dofs).
+    """
+
+    names: tuple[str, ...]
+    known: SecondOrder
+    mass: Array
+    damping: Array
+    stiffness: Array
+
+    def __post_init__(self) -> None:
+        n = len(self.known.dofs)
+        for name in ("mass", "damping", "stiffness"):
+            pattern = frozen(getattr(self, name))
+            if pattern.shape != (len(self.names), n, n):
+                raise IdentificationError(
+                    f"{name} patterns have shape {pattern.shape}; expected ({len(self.names)}, {n}, {n})"
+                )
+            object.__setattr__(self, name, pattern)
+
+    def start(self, model: Any) -> Array:
+        """θ by least squares from given matrices, or from the matrices behind a state space.
+
+        Args:
+            model: a `SecondOrder` with the same degrees of freedom in any order, a `StateSpace` or
+                `Realization` with two states for each, or θ itself.
+
+        Raises:
+            NotSecondOrderError: the degrees of freedom differ, or the state space has no such matrices.
+        """
+        if isinstance(model, Realization):
+            model = model.system
+        if isinstance(model, StateSpace):
+            model = second_order(model, dofs=self.known.dofs)
+        if not isinstance(model, SecondOrder):
+            return start_values(model, self.names)
+        if set(model.dofs) != set(self.known.dofs):
+            raise NotSecondOrderError(
+                f"the start has degrees of freedom {', '.join(model.dofs)}; expected {', '.join(self.known.dofs)}"
+            )
+        rank = [model.dofs.index(dof) for dof in self.known.dofs]
+        rows, rhs = [], []
+        for name in ("mass", "damping", "stiffness"):
+            target = getattr(model, name)[np.ix_(rank, rank)] - getattr(self.known, name)
+            unit = np.max(np.abs(getattr(model, name))) or 1.0
+            rows.append(getattr(self, name).reshape(len(self.names), -1).T / unit)
+            rhs.append(target.ravel() / unit)
+        return np.asarray(np.linalg.lstsq(np.vstack(rows), np.concatenate(rhs), rcond=None)[0])
+
+    def matrices(self, theta: Array) -> StructureTangent:
+        """The matrices at θ and their patterns."""
+        M, C, K = (
+            getattr(self.known, name) + np.tensordot(theta, getattr(self, name), 1)
+            for name in ("mass", "damping", "stiffness")
+        )
+        structure = SecondOrder(M, C, K, self.known.dofs)
+        return StructureTangent(structure, self.mass, self.damping, self.stiffness)
+
+    def tangent(self, theta: Array, inputs: Sequence[Channel], outputs: Sequence[Channel]) -> Tangent:
+        """The state space at θ seen through these channels, with its derivatives."""
+        return self.matrices(theta).instrumented(inputs, outputs)
+
+
+def free_matrices(dofs: Sequence[str]) -> LinearStructure:
+    """Every entry on and above the diagonal of M, C_d and K is a parameter.
+
+    Args:
+        dofs: names of the degrees of freedom.
+
+    Returns:
+        The parameters M[i,j], then C[i,j], then K[i,j], named by degrees of freedom, row by row.
+    """
+    n = len(dofs)
+    entries = [(i, j) for i in range(n) for j in range(i, n)]
+    pattern = np.zeros((len(entries), n, n))
+    for p, (i, j) in enumerate(entries):
+        pattern[p, i, j] = pattern[p, j, i] = 1.0
+    names = tuple(f"{matrix}[{dofs[i]},{dofs[j]}]" for matrix in "MCK" for i, j in entries)
+    return _in_three_parts(names, dofs, (pattern, pattern, pattern))
+
+
+def spring_network(
+    dofs: Sequence[str],
+    springs: Sequence[Element],
+    *,
+    dashpots: Sequence[Element] | None = None,
+    masses: Mapping[str, float] | None = None,
+) -> LinearStructure:
+    """One mass on each degree of freedom, springs and dashpots between named places.
+
+    Args:
+        dofs: names of the degrees of freedom.
+        springs: a pair of DOF, a DOF and "world", or a mapping from DOF to the extension per unit of its motion,
+            as for a bar in the plane.
+        dashpots: likewise; one beside each spring when None.
+        masses: the known mass on each degree of freedom [kg]; parameters when None.
+
+    Returns:
+        The parameters m(dof), c(element) and k(element), in this order.
+
+    Raises:
+        NotSecondOrderError: an element holds on to something that is not among `dofs`.
+    """
+    n = len(dofs)
+    if masses is not None and set(masses) != set(dofs):
+        raise NotSecondOrderError(
+            f"masses are given for {', '.join(masses) or 'none'}; expected one for each of {', '.join(dofs)}"
+        )
+    M = np.zeros((n, n)) if masses is None else np.diag([masses[dof] for dof in dofs])
+    free = list(dofs) if masses is None else []
+    parts = (
+        np.array([np.outer(row, row) for row in np.eye(n)[: len(free)]]).reshape(-1, n, n),
+        np.array([_pattern(e, dofs) for e in (springs if dashpots is None else dashpots)]).reshape(-1, n, n),
+        np.array([_pattern(e, dofs) for e in springs]).reshape(-1, n, n),
+    )
+    names = (
+        *(f"m({dof})" for dof in free),
+        *(f"c({_label(e)})" for e in (springs if dashpots is None else dashpots)),
+        *(f"k({_label(e)})" for e in springs),
+    )
+    return _in_three_parts(names, dofs, parts, M)
+
+
+def channel_matrices(
+    dofs: Sequence[str], inputs: Sequence[Channel], outputs: Sequence[Channel]
+) -> tuple[Array, Array, Array, Array]:
+    """Where the channels sit: f = B u and y = C_p q + C_v q̇ + C_a q̈.
+
+    Returns:
+        B, shape (n_dofs, n_inputs), and C_p, C_v, C_a, each (n_outputs, n_dofs).
+
+    Raises:
+        NotSecondOrderError: a channel neither drives nor reads the motion of one of `dofs`.
+    """
+    B = np.zeros((len(dofs), len(inputs)))
+    C = np.zeros((3, len(outputs), len(dofs)))
+    for channel in (*inputs, *outputs):
+        if channel.dof not in dofs:
+            raise NotSecondOrderError(
+                f"channel {channel.name!r} has dof {channel.dof!r}; expected one of {', '.join(dofs)}; set it, or "
+                "select the other channels"
+            )
+    for j, channel in enumerate(inputs):
+        B[dofs.index(channel.dof), j] = channel.factor
+    for i, channel in enumerate(outputs):
+        if channel.quantity not in DERIVATIVE:
+            raise NotSecondOrderError(
+                f"output {channel.name!r} measures {channel.quantity}; expected {', '.join(DERIVATIVE)}; select the "
+                "other channels"
+            )
+        C[DERIVATIVE[channel.quantity], i, dofs.index(channel.dof)] = channel.factor
+    return B, C[0], C[1], C[2]
+
+
+def _in_three_parts(
+    names: tuple[str, ...],
+    dofs: Sequence[str],
+    parts: tuple[Array, Array, Array],
+    known_mass: Array | None = None,
+) -> LinearStructure:
+    """Parameters of the mass first, then of the damping, then of the stiffness."""
+    n = len(dofs)
+    zero = np.zeros((n, n))
+    known = SecondOrder(zero if known_mass is None else known_mass, zero, zero, tuple(dofs))
+    blocks = np.split(np.zeros((len(names), 3, n, n)), np.cumsum([len(part) for part in parts])[:2])
+    for position, (block, part) in enumerate(zip(blocks, parts, strict=True)):
+        block[:, position] = part
+    patterns = np.concatenate(blocks)
+    return LinearStructure(names, known, patterns[:, 0], patterns[:, 1], patterns[:, 2])
+
+
+def _pattern(element: Element, dofs: Sequence[str]) -> Array:
+    """The matrix g gᵀ of a unit element, where g q is its extension."""
+    extension = element if isinstance(element, Mapping) else {element[0]: -1.0, element[1]: 1.0}
+    g = np.zeros(len(dofs))
+    for dof, coefficient in extension.items():
+        if dof not in (*dofs, WORLD):
+            raise NotSecondOrderError(
+                f"an element holds on to {dof!r}; expected {WORLD} or one of {', '.join(dofs)}"
+            )
+        if dof != WORLD:
+            g[dofs.index(dof)] = coefficient
+    return np.outer(g, g)
+
+
+def _label(element: Element) -> str:
+    return "|".join(element)

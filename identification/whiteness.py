@@ -1,0 +1,48 @@
+"""Whether what a model leaves unexplained is noise."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+import scipy.fft
+import scipy.special
+
+from identification.recording import Array
+
+
+def autocorrelation(residual: Array, n_lags: int) -> Array:
+    """Correlation of each row with itself 1, 2, … samples later, shape (n_rows, n_lags).
+
+    Args:
+        residual: shape (n_rows, n_samples).
+        n_lags: largest lag.
+    """
+    n_samples = residual.shape[1]
+    size = scipy.fft.next_fast_len(n_samples + n_lags, real=True)
+    spectrum = scipy.fft.rfft(residual, size)
+    products = scipy.fft.irfft(np.abs(spectrum) ** 2, size)[:, : n_lags + 1]
+    power = products[:, :1]
+    return np.asarray(products[:, 1:] / np.where(power > 0, power, 1))
+
+
+def whiteness(residuals: Sequence[Array], *, n_lags: int = 20) -> Array:
+    """Probability that white noise looks at least as correlated as each row, shape (n_outputs,).
+
+    Near zero: the model misses something that lasts from sample to sample. Uniform between 0 and 1 where the
+    model is right and the records are long against `n_lags`.
+
+    Args:
+        residuals: one array per record, shape (n_outputs, n_samples).
+        n_lags: number of lags looked at, lowered where a record is shorter than five times as many samples.
+
+    Source: Ljung and Box (1978), Biometrika 65(2), statistic Q̃, summed over the records.
+    """
+    statistic, freedom = np.zeros(len(residuals[0])), 0
+    for residual in residuals:
+        n_samples = residual.shape[1]
+        lags = np.arange(1, 1 + min(n_lags, n_samples // 5))
+        r = autocorrelation(residual, lags.size)
+        statistic += n_samples * (n_samples + 2) * np.sum(r**2 / (n_samples - lags), axis=1)
+        freedom += lags.size
+    return np.asarray(scipy.special.chdtrc(max(freedom, 1), statistic))
