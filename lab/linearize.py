@@ -49,7 +49,7 @@ def equilibrium(model: mujoco.MjModel) -> Array:
         position, force = trial, trial_force
         if np.max(np.abs(force)) <= 1e-13 * scale:
             return position
-    if np.max(np.abs(force)) <= 1e-10 * scale:
+    if np.max(np.abs(force)) <= 1e-8 * scale:
         return position
     raise RigError(
         f"the model finds no position of rest near its reference position (a force of {np.max(np.abs(force)):.3g} remains); "
