@@ -1,0 +1,60 @@
+"""What the README shows is true."""
+
+import re
+from pathlib import Path
+
+import numpy as np
+
+from lab import catalogue
+from lab.rig import Rig
+
+ROOT = Path(__file__).parent.parent
+README = (ROOT / "README.md").read_text("utf-8")
+
+
+def blocks(language):
+    return re.findall(rf"```{language}\n(.*?)```", README, re.DOTALL)
+
+
+def test_the_python_lines_run(monkeypatch, capsys):
+    monkeypatch.chdir(ROOT)
+    (code,) = blocks("python")
+    names = {}
+    exec(code, names)
+    # Pairwise springs 1.0 and ground springs 2.0; simulated to 1e-9, which the extraction keeps to about 1e-7.
+    truth = np.array([[4.0, -1.0, -1.0], [-1.0, 4.0, -1.0], [-1.0, -1.0, 4.0]])
+    np.testing.assert_allclose(names["found"].second_order.stiffness, truth, atol=1e-6)
+    assert "Modes(" in capsys.readouterr().out
+
+
+def test_the_checks_run_the_test_command():
+    tests = [block.strip() for block in blocks("sh") if "pytest" in block]
+    assert tests == [".venv/bin/pytest"]
+    assert tests[0] in (ROOT / ".ci/run").read_text("utf-8").splitlines()
+
+
+def test_the_table_lists_every_scenario():
+    listed = set(re.findall(r"^\| `(\w+)` \|", README, re.MULTILINE))
+    assert set(catalogue.files("scenarios")) == listed
+
+
+def test_links_lead_somewhere():
+    prose = re.sub(r"```.*?```", "", README, flags=re.DOTALL)
+    for target in re.findall(r"\]\(([^)#]+)\)", prose):
+        assert target.startswith("https://") or (ROOT / target).exists(), target
+
+
+def test_the_table_of_models_is_true():
+    rows = re.findall(r"^\| `(\w+)` \|(.*)\|$", (ROOT / "models/README.md").read_text("utf-8"), re.MULTILINE)
+    assert {name for name, _ in rows} == set(catalogue.files("models"))
+    for name, cells in rows:
+        *_, n_dofs, frequencies, ratios = (cell.strip() for cell in cells.split(" | "))
+        modes = Rig.load(catalogue.find("models", name)).second_order().modes()
+        assert int(n_dofs) == len(modes)
+        # As many digits as are printed.
+        np.testing.assert_allclose(
+            modes.frequency_hz, [float(f) for f in frequencies.split(", ")], atol=5.1e-5
+        )
+        np.testing.assert_allclose(
+            100 * modes.damping_ratio, [float(z) for z in ratios.split(", ")], atol=5.1e-3
+        )
