@@ -21,7 +21,6 @@ UNITS = {
     S.mjSENS_TORQUE: "N m",
     S.mjSENS_TENDONPOS: "m",
     S.mjSENS_TENDONVEL: "m/s",
-    S.mjSENS_ACTUATORFRC: "N",
     S.mjSENS_TENDONACTFRC: "N",
     S.mjSENS_FRAMEPOS: "m",
     S.mjSENS_FRAMELINVEL: "m/s",
@@ -31,12 +30,19 @@ UNITS = {
     S.mjSENS_SUBTREECOM: "m",
     S.mjSENS_SUBTREELINVEL: "m/s",
 }
-"""Sensors that are output channels; joint sensors follow the kind of their joint."""
+"""Sensors that are output channels; sensors of joints and actuators follow the kind of their joint."""
 JOINT_UNITS = {
     S.mjSENS_JOINTPOS: ("m", "rad"),
     S.mjSENS_JOINTVEL: ("m/s", "rad/s"),
     S.mjSENS_JOINTACTFRC: ("N", "N m"),
 }
+ACTUATOR_UNITS = {
+    S.mjSENS_ACTUATORPOS: ("m", "rad"),
+    S.mjSENS_ACTUATORVEL: ("m/s", "rad/s"),
+    S.mjSENS_ACTUATORFRC: ("N", "N m"),
+}
+HINGE = int(mujoco.mjtJoint.mjJNT_HINGE)
+AT_JOINT = (int(mujoco.mjtTrn.mjTRN_JOINT), int(mujoco.mjtTrn.mjTRN_JOINTINPARENT))
 DERIVATIVE = {"m": 0, "rad": 0, "m/s": 1, "rad/s": 1, "m/s^2": 2, "rad/s^2": 2}
 
 
@@ -115,27 +121,33 @@ def _pick(
 
 
 def _unit(model: mujoco.MjModel, sensor: int) -> str | None:
-    kind = S(model.sensor_type[sensor])
+    kind, target = S(model.sensor_type[sensor]), model.sensor_objid[sensor]
     if kind in JOINT_UNITS:
-        hinge = model.jnt_type[model.sensor_objid[sensor]] == int(mujoco.mjtJoint.mjJNT_HINGE)
-        return JOINT_UNITS[kind][int(hinge)]
+        return JOINT_UNITS[kind][int(model.jnt_type[target] == HINGE)]
+    if kind in ACTUATOR_UNITS:
+        return ACTUATOR_UNITS[kind][int(_turns(model, target))]
     return UNITS.get(kind)
+
+
+def _turns(model: mujoco.MjModel, actuator: int) -> bool:
+    """Whether an actuator acts on a hinge."""
+    at_joint = model.actuator_trntype[actuator] in AT_JOINT
+    return bool(at_joint and model.jnt_type[model.actuator_trnid[actuator, 0]] == HINGE)
 
 
 def _input(model: mujoco.MjModel, actuator: int, column: Array, names: list[str]) -> Channel:
     dof, factor = _single(column, names)
-    hinge = model.actuator_trntype[actuator] == int(mujoco.mjtTrn.mjTRN_JOINT) and (
-        model.jnt_type[model.actuator_trnid[actuator, 0]] == int(mujoco.mjtJoint.mjJNT_HINGE)
-    )
     # A servo turns its control into a force proportional to position or velocity: the control has that unit.
-    bias = model.actuator_biasprm[actuator]
-    if bias[1]:
-        unit = "rad" if hinge else "m"
-    elif bias[2]:
-        unit = "rad/s" if hinge else "m/s"
+    affine = model.actuator_biastype[actuator] == int(mujoco.mjtBias.mjBIAS_AFFINE)
+    bias = affine * model.actuator_biasprm[actuator]
+    integrates = model.actuator_dyntype[actuator] == int(mujoco.mjtDyn.mjDYN_INTEGRATOR)
+    if bias[1] and not integrates:
+        unit = ("m", "rad")
+    elif bias[1] or bias[2]:
+        unit = ("m/s", "rad/s")
     else:
-        unit = "N m" if hinge else "N"
-    return Channel(name_of(model, "actuator", actuator), unit, dof, factor)
+        unit = ("N", "N m")
+    return Channel(name_of(model, "actuator", actuator), unit[int(_turns(model, actuator))], dof, factor)
 
 
 def _single(row: Array, names: list[str]) -> tuple[str, float]:
