@@ -155,11 +155,12 @@ def keep_long(cluster: Indices) -> Indices:
         return cluster
     length = np.bincount(cluster[cluster >= 0])
     size = np.sqrt(length)
-    short, long = 0.0, float(np.max(size))
-    for _ in range(length.size):  # each round moves at least one cluster to the other class, or nothing moves
-        is_long = size > (short + long) / 2
-        short, long = np.sum(size[~is_long]) / (1 + np.sum(~is_long)), float(np.mean(size[is_long]))
-    is_long = (size > (short + long) / 2) & (length >= MIN_LENGTH)
+    border, last = float(np.max(size)) / 2, -1.0
+    while border != last:
+        is_long = size > border
+        short = np.sum(size[~is_long]) / (1 + np.sum(~is_long))
+        border, last = (short + np.mean(size[is_long])) / 2, border
+    is_long = (size > border) & (length >= MIN_LENGTH)
     number = np.append(np.where(is_long, np.cumsum(is_long) - 1, -1), -1)
     return number[cluster]
 

@@ -7,7 +7,6 @@ chains of one pole are joined to clusters; and the long clusters are the modes.
 
 from __future__ import annotations
 
-import itertools
 from dataclasses import dataclass, fields
 
 import numpy as np
@@ -131,51 +130,51 @@ def _all_poles(realization: Realization) -> Poles:
 
 def _follow(poles: Poles, limits: Thresholds) -> tuple[Indices, Indices]:
     """The first rule against each pole, as a position in `NAMES`, and the number of its chain, -1 for none."""
-    rule = _hard_rules(poles, limits)
-    chain = np.full(rule.size, -1)
-    n_chains = 0
-    before = np.empty(0, dtype=np.intp)
-    borders = np.flatnonzero(np.diff(poles.order, prepend=-1, append=-1))
-    for first, last in itertools.pairwise(borders.tolist()):
-        here = first + np.flatnonzero(rule[first:last] == 0)
-        if before.size and here.size:
-            found, mate = _soft_rules(poles.take(here), poles.take(before), limits)
-            rule[here] = found
-            go_on, mate = here[found == 0], before[mate[found == 0]]
-            new = chain[mate] < 0
-            chain[go_on] = np.where(new, n_chains + np.cumsum(new) - 1, chain[mate])
-            n_chains += int(np.sum(new))
-        else:
-            rule[here] = NAMES.index("lowest order")
-        before = here
-    return rule, chain
-
-
-def _hard_rules(poles: Poles, limits: Thresholds) -> Indices:
-    """The first rule against each pole by itself."""
-    return _first(
+    rule = _first(
         {
             "negative damping": poles.damping_ratio < 0,
             "damping too high": poles.damping_ratio > limits.max_damping,
             "complex shape": modal_phase_collinearity(poles.shapes) < limits.min_collinearity,
         }
     )
-
-
-def _soft_rules(here: Poles, before: Poles, limits: Thresholds) -> tuple[Indices, Indices]:
-    """The first rule against following each pole from the lower order, and its nearest pole there."""
-    apart = difference(here, before, limits)
-    mate = np.argmin(apart.distance, axis=1)
-    own = np.arange(mate.size)
-    rule = _first(
+    left = np.flatnonzero(rule == 0)
+    mate, far, double = _nearest_below(poles.take(left), limits)
+    rule[left] = _first(
         {
-            "frequency jumps": apart.frequency[own, mate] > 1,
-            "shape jumps": apart.shape[own, mate] > 1,
-            "damping jumps": apart.damping[own, mate] > 1,
-            "double": np.argmin(apart.distance, axis=0)[mate] != own,
+            "lowest order": mate < 0,
+            "frequency jumps": far[0] > 1,
+            "shape jumps": far[1] > 1,
+            "damping jumps": far[2] > 1,
+            "double": double,
         }
     )
-    return rule, mate
+    # A chain is named by the pole before its first; following the links twice as far each time finds it.
+    follows = rule[left] == 0
+    start = np.where(follows, mate, np.arange(left.size))
+    for _ in range(left.size.bit_length()):
+        start = start[start]
+    chain = np.full(rule.size, -1)
+    chain[left[follows]] = np.unique(start[follows], return_inverse=True)[1]
+    return rule, chain
+
+
+def _nearest_below(poles: Poles, limits: Thresholds) -> tuple[Indices, Array, NDArray[np.bool_]]:
+    """The nearest pole of the next lower order, -1 for none; how far it is; and whether another pole is nearer.
+
+    Returns:
+        Positions, shape (n_poles,); frequency, shape and damping over what is allowed, shape (3, n_poles); and
+        whether the lower pole has a nearer one among those of this pole's order, shape (n_poles,).
+    """
+    mate, far = np.full(poles.order.size, -1), np.zeros((3, poles.order.size))
+    double = np.zeros(poles.order.size, dtype=bool)
+    borders = np.flatnonzero(np.diff(poles.order, prepend=-1, append=-1)).tolist()
+    for a, b, c in zip(borders, borders[1:], borders[2:], strict=False):
+        apart = difference(poles.take(slice(b, c)), poles.take(slice(a, b)), limits)
+        nearest, own = np.argmin(apart.distance, axis=1), np.arange(c - b)
+        mate[b:c] = a + nearest
+        far[:, b:c] = [each[own, nearest] for each in apart[:3]]
+        double[b:c] = np.argmin(apart.distance, axis=0)[nearest] != own
+    return mate, far, double
 
 
 def _first(rules: dict[str, NDArray[np.bool_]]) -> Indices:

@@ -93,7 +93,7 @@ class StateSpace:
 
     def eigen(self) -> tuple[Complex, Complex]:
         """Continuous-time poles λ [rad/s], (n_states,), and eigenvectors of A, (n_states, n_states)."""
-        z, vectors = scipy.linalg.eig(self.A)
+        z, vectors = np.linalg.eig(self.A)
         if self.dt == 0.0:
             return z, vectors
         with np.errstate(divide="ignore"):
