@@ -120,7 +120,7 @@ def _plan(recording: Recording, orders: list[int], n_rows: int | None, n_referen
     n_columns = -(-n_rows // stride)
     if stride > 1:
         notes.append(
-            f"The past enters at every {stride}th lag only, as neighbouring ones tell nearly the same."
+            f"The past enters at one lag in {stride}, as neighbouring ones tell nearly the same."
         )
     largest = min((n_rows - 1) * len(recording.outputs), n_columns * n_references)
     if sweep:
