@@ -11,9 +11,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from identification.error_bars import covariance_of, delta_method, spread
 from identification.errors import TooShortError
 from identification.families import Model, family
-from identification.information import covariance_of, delta_method, spread
 from identification.modal_parameters import ModalParameters
 from identification.modes import Modes
 from identification.output_error import OutputError, output_error, simulated

@@ -124,22 +124,23 @@ def hold(poles: Complex, system_dt: float, dt: float) -> Hold:
     if system_dt:
         return Hold(poles, one, one, 0 * one)
     x = poles * dt
-    z = np.exp(x)
+    still = x == 0
+    h = np.where(still, one, np.expm1(x) / np.where(still, 1, x))
+    z: Complex = np.asarray(np.exp(x), dtype=np.complex128)
+    return Hold(z, dt * h, dt * z, dt**2 * _slope(x))
+
+
+def _slope(x: Complex) -> Complex:
+    """Derivative of (eˣ - 1) / x: (eˣ - (eˣ - 1) / x) / x, near zero by its series Σ xᵏ / (k! (k + 2))."""
     small = np.abs(x) < 0.5
-    safe = np.where(small, 1, x)
-    h = np.where(small, _series(x, 1), np.expm1(safe) / safe)
-    slope = np.where(small, _series(x, 2), (np.exp(safe) - np.expm1(safe) / safe) / safe)
-    return Hold(z, dt * h, dt * z, dt**2 * slope)
-
-
-def _series(x: Complex, kind: int) -> Complex:
-    """φ(x) = (eˣ - 1) / x = Σ xᵏ / (k + 1)! for kind 1, its derivative Σ xᵏ / (k! (k + 2)) for kind 2."""
-    total, term = np.zeros_like(x), np.ones_like(x)
-    x = np.where(np.abs(x) < 0.5, x, 0)
+    far = np.where(small, 1, x)
+    slope = (np.exp(far) - np.expm1(far) / far) / far
+    near = np.where(small, x, 0)
+    series, term = np.zeros_like(x), np.ones_like(x)
     for k in range(18):
-        total = total + term / (k + kind)
-        term = term * x / (k + 1)
-    return total
+        series = series + term / (k + 2)
+        term = term * near / (k + 1)
+    return np.where(small, series, slope)
 
 
 def _signals(

@@ -68,14 +68,15 @@ class OutputError:
         """
         return self.parameterization.tangent(q[: self.n_theta], self.inputs, self.outputs)
 
-    def squares(self, q: Array) -> Array | None:
-        """Sum of squared errors of each record and output, (n_records, n_outputs); None where no model exists."""
+    def squares(self, q: Array) -> Array:
+        """Sum of squared errors of each record and output, (n_records, n_outputs); infinite without a model."""
+        nowhere = np.full((len(self.runs), len(self.outputs)), np.inf)
         try:
             system = self.tangent(q).system
             if not self._bounded(system):
-                return None
+                return nowhere
         except np.linalg.LinAlgError:
-            return None
+            return nowhere
         predictions = simulated(system, self.runs, self.initial(q))
         return np.stack(
             [np.sum((run.outputs - y) ** 2, axis=1) for run, y in zip(self.runs, predictions, strict=True)]

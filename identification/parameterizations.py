@@ -1,8 +1,8 @@
 """How a model depends on its parameters: the model at θ and its derivative with respect to each of them.
 
 Whatever offers `names`, `start` and `tangent` can be fitted by `refine` and judged by `cramer_rao_bound`: the
-matrices of a structure (structures.py), modes (modal_parameters.py), or any function of parameters that gives a
-state space (`Custom`, below).
+matrices of a structure (structures.py, spring_network.py), modes (modal_parameters.py), or any function of
+parameters that gives a state space (`Custom`, below).
 """
 
 from __future__ import annotations

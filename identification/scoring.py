@@ -6,7 +6,9 @@ Each record and output has noise of its own, unknown size. At its best value the
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -51,9 +53,9 @@ class Noise:
         pooled = np.sum(squares + self.n_samples * self.floor, axis=0) / np.sum(self.n_samples)
         return np.broadcast_to(pooled, squares.shape)
 
-    def cost(self, squares: Array | None) -> float:
+    def cost(self, squares: Array) -> float:
         """Minus the log-likelihood, but for a constant; infinite where no model exists."""
-        if squares is None or not np.all(np.isfinite(squares)):
+        if not np.all(np.isfinite(squares)):
             return np.inf
         return float(0.5 * np.sum(self.n_samples * np.log(self.variance(squares))))
 
@@ -136,36 +138,66 @@ def maximize(problem: OutputError, noise: Noise, start: Array, *, max_iterations
     Source: Osborne (1992), Int. Stat. Rev. 60(1), Fisher's method of scoring; Marquardt (1963), J. SIAM 11(2),
     for the damping.
     """
-    q, squares = start, problem.squares(start)
-    cost = noise.cost(squares)
-    if squares is None or not np.isfinite(cost):
+
+    def look(q: Array) -> _Point:
+        squares = problem.squares(q)
+        return _Point(q, squares, noise.cost(squares))
+
+    here, damping, iteration = look(start), 0.0, 0
+    if not np.isfinite(here.cost):
         raise IdentificationError(
             "the model of the start grows beyond all bounds within a record or has a singular mass matrix; "
             "start from a stable model"
         )
-    damping, iteration = 0.0, 0
     while True:
-        gradient, information = problem.normal_equations(q, 1 / noise.variance(squares))
+        gradient, information = problem.normal_equations(here.q, 1 / noise.variance(here.squares))
         curvature = Curvature.of(information)
-        distance2 = float(gradient @ curvature.solve(gradient))
+        distance2 = max(float(gradient @ curvature.solve(gradient)), 0.0)
         done = distance2 < TOLERANCE
         if done or iteration == max_iterations:
             break
-        trial = None
-        while trial is None and damping < MAX_DAMPING:
-            step = curvature.solve(gradient, damping)
-            trial = problem.squares(q + step)
-            gain = cost - noise.cost(trial)
-            if trial is None or not gain > 0:
-                trial, damping = None, max(10 * damping, 1e-4)
-        if trial is None:
+        better, damping = _improve(look, here, gradient, curvature, damping)
+        if better is None:
             done = distance2 < GOOD_ENOUGH
             break
-        expected = gradient @ step - 0.5 * step @ information @ step
-        if gain > 0.5 * expected:
-            damping = damping / 10 if damping > 1e-5 else 0.0
-        q, squares, cost, iteration = q + step, trial, cost - gain, iteration + 1
-    return Optimum(q, squares, information, iteration, float(np.sqrt(max(distance2, 0.0))), done)
+        here, iteration = better, iteration + 1
+    return Optimum(here.q, here.squares, information, iteration, float(np.sqrt(distance2)), done)
+
+
+class _Point(NamedTuple):
+    """Unknowns, their squared errors (infinite where no model exists) and minus their log-likelihood."""
+
+    q: Array
+    squares: Array
+    cost: float
+
+
+def _improve(
+    look: Callable[[Array], _Point], here: _Point, gradient: Array, curvature: Curvature, damping: float
+) -> tuple[_Point | None, float]:
+    """A point of less cost, None where rounding hides it, and the damping to go on with."""
+    while damping < MAX_DAMPING:
+        step = curvature.solve(gradient, damping)
+        there, slope = look(here.q + step), float(gradient @ step)
+        if there.cost < here.cost:
+            if here.cost - there.cost > slope / 4:
+                damping = damping / 10 if damping > 1e-5 else 0.0
+            return _stretch(look, here, there, slope), damping
+        damping = max(10 * damping, 1e-4)
+    return None, damping
+
+
+def _stretch(look: Callable[[Array], _Point], here: _Point, there: _Point, slope: float) -> _Point:
+    """The better of a step and its best multiple by the parabola through what is known of the cost.
+
+    The true curvature departs from the expected one where noise is strong; this makes up for it.
+    """
+    bend = 2 * (slope - (here.cost - there.cost))
+    length = slope / max(bend, slope / 4)
+    if abs(length - 1) < 0.1:
+        return there
+    further = look(here.q + length * (there.q - here.q))
+    return further if further.cost < there.cost else there
 
 
 def solve_linear(problem: OutputError, start: Array, which: NDArray[np.bool_]) -> Array:

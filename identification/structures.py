@@ -1,8 +1,8 @@
-"""Structures whose mass, damping and stiffness depend on parameters: free matrices, networks of springs."""
+"""Structures whose mass, damping and stiffness depend on parameters, instrumented or not."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -14,12 +14,6 @@ from identification.parameterizations import Tangent, start_values
 from identification.recording import DERIVATIVE, Array, Channel, frozen
 from identification.second_order import second_order
 from identification.systems import Realization, SecondOrder, StateSpace
-
-WORLD = "world"
-"""The ground that a spring or dashpot may hold on to."""
-
-Element = tuple[str, str] | Mapping[str, float]
-"""What a spring or dashpot spans: two DOF (or one and `WORLD`), or the row that gives its extension."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -177,49 +171,31 @@ def free_matrices(dofs: Sequence[str]) -> LinearStructure:
     for p, (i, j) in enumerate(entries):
         pattern[p, i, j] = pattern[p, j, i] = 1.0
     names = tuple(f"{matrix}[{dofs[i]},{dofs[j]}]" for matrix in "MCK" for i, j in entries)
-    return _in_three_parts(names, dofs, (pattern, pattern, pattern))
+    return in_three_parts(names, dofs, (pattern, pattern, pattern))
 
 
-def spring_network(
+def in_three_parts(
+    names: tuple[str, ...],
     dofs: Sequence[str],
-    springs: Sequence[Element],
-    *,
-    dashpots: Sequence[Element] | None = None,
-    masses: Mapping[str, float] | None = None,
+    parts: tuple[Array, Array, Array],
+    known_mass: Array | None = None,
 ) -> LinearStructure:
-    """One mass on each degree of freedom, springs and dashpots between named places.
+    """Structure whose parameters belong to the mass first, then to the damping, then to the stiffness.
 
     Args:
+        names: one per parameter.
         dofs: names of the degrees of freedom.
-        springs: a pair of DOF, a DOF and "world", or a mapping from DOF to the extension per unit of its motion,
-            as for a bar in the plane.
-        dashpots: likewise; one beside each spring when None.
-        masses: the known mass on each degree of freedom [kg]; parameters when None.
-
-    Returns:
-        The parameters m(dof), c(element) and k(element), in this order.
-
-    Raises:
-        NotSecondOrderError: an element holds on to something that is not among `dofs`.
+        parts: patterns of mass, damping and stiffness, each (n_patterns, n_dofs, n_dofs).
+        known_mass: what the mass has besides, shape (n_dofs, n_dofs); nothing when None.
     """
     n = len(dofs)
-    if masses is not None and set(masses) != set(dofs):
-        raise NotSecondOrderError(
-            f"masses are given for {', '.join(masses) or 'none'}; expected one for each of {', '.join(dofs)}"
-        )
-    M = np.zeros((n, n)) if masses is None else np.diag([masses[dof] for dof in dofs])
-    free = list(dofs) if masses is None else []
-    parts = (
-        np.array([np.outer(row, row) for row in np.eye(n)[: len(free)]]).reshape(-1, n, n),
-        np.array([_pattern(e, dofs) for e in (springs if dashpots is None else dashpots)]).reshape(-1, n, n),
-        np.array([_pattern(e, dofs) for e in springs]).reshape(-1, n, n),
-    )
-    names = (
-        *(f"m({dof})" for dof in free),
-        *(f"c({_label(e)})" for e in (springs if dashpots is None else dashpots)),
-        *(f"k({_label(e)})" for e in springs),
-    )
-    return _in_three_parts(names, dofs, parts, M)
+    zero = np.zeros((n, n))
+    known = SecondOrder(zero if known_mass is None else known_mass, zero, zero, tuple(dofs))
+    blocks = np.split(np.zeros((len(names), 3, n, n)), np.cumsum([len(part) for part in parts])[:2])
+    for position, (block, part) in enumerate(zip(blocks, parts, strict=True)):
+        block[:, position] = part
+    patterns = np.concatenate(blocks)
+    return LinearStructure(names, known, patterns[:, 0], patterns[:, 1], patterns[:, 2])
 
 
 def channel_matrices(
@@ -251,38 +227,3 @@ def channel_matrices(
             )
         C[DERIVATIVE[channel.quantity], i, dofs.index(channel.dof)] = channel.factor
     return B, C[0], C[1], C[2]
-
-
-def _in_three_parts(
-    names: tuple[str, ...],
-    dofs: Sequence[str],
-    parts: tuple[Array, Array, Array],
-    known_mass: Array | None = None,
-) -> LinearStructure:
-    """Parameters of the mass first, then of the damping, then of the stiffness."""
-    n = len(dofs)
-    zero = np.zeros((n, n))
-    known = SecondOrder(zero if known_mass is None else known_mass, zero, zero, tuple(dofs))
-    blocks = np.split(np.zeros((len(names), 3, n, n)), np.cumsum([len(part) for part in parts])[:2])
-    for position, (block, part) in enumerate(zip(blocks, parts, strict=True)):
-        block[:, position] = part
-    patterns = np.concatenate(blocks)
-    return LinearStructure(names, known, patterns[:, 0], patterns[:, 1], patterns[:, 2])
-
-
-def _pattern(element: Element, dofs: Sequence[str]) -> Array:
-    """The matrix g gᵀ of a unit element, where g q is its extension."""
-    extension = element if isinstance(element, Mapping) else {element[0]: -1.0, element[1]: 1.0}
-    g = np.zeros(len(dofs))
-    for dof, coefficient in extension.items():
-        if dof not in (*dofs, WORLD):
-            raise NotSecondOrderError(
-                f"an element holds on to {dof!r}; expected {WORLD} or one of {', '.join(dofs)}"
-            )
-        if dof != WORLD:
-            g[dofs.index(dof)] = coefficient
-    return np.outer(g, g)
-
-
-def _label(element: Element) -> str:
-    return "|".join(element)
