@@ -116,7 +116,7 @@ def mac(a: Complex, b: Complex) -> Array:
             f"shapes have {a.shape[0]} and {b.shape[0]} outputs; expected the same outputs in both"
         )
     squared = np.outer(np.sum(np.abs(a) ** 2, axis=0), np.sum(np.abs(b) ** 2, axis=0))
-    return np.asarray(np.abs(a.conj().T @ b) ** 2 / np.where(squared == 0, 1, squared))
+    return np.abs(a.conj().T @ b) ** 2 / np.where(squared == 0, 1, squared)
 
 
 def modal_phase_collinearity(shapes: Complex) -> Array:
@@ -128,4 +128,4 @@ def modal_phase_collinearity(shapes: Complex) -> Array:
     x, y = shapes.real, shapes.imag
     sxx, syy, sxy = np.sum(x * x, axis=0), np.sum(y * y, axis=0), np.sum(x * y, axis=0)
     total = (sxx + syy) ** 2
-    return ((sxx - syy) ** 2 + 4 * sxy**2) / np.where(total == 0, 1, total)
+    return np.asarray(((sxx - syy) ** 2 + 4 * sxy**2) / np.where(total == 0, 1, total))
