@@ -40,8 +40,8 @@ def ssi_cov(
             None.
         orders: orders to realize besides `order`; when both are None, 2, 4, … up to six for each resonance
             peak in the spectra.
-        n_rows: block rows of the Hankel matrix, so that lags 1 to 2 `n_rows` - 1 are used; one period of
-            the lowest resonance peak when None.
+        n_rows: block rows of the Hankel matrix, so that lags 1 to 2 `n_rows` - 1 are used; two thirds
+            of a period of the lowest resonance peak when None.
         references: names of the reference outputs, of which each covariance takes one; all outputs when None.
 
     Returns:
@@ -119,9 +119,7 @@ def _plan(recording: Recording, orders: list[int], n_rows: int | None, n_referen
     stride = -(-n_rows * n_references // MAX_COLUMNS)
     n_columns = -(-n_rows // stride)
     if stride > 1:
-        notes.append(
-            f"The past enters at one lag in {stride}, as neighbouring ones tell nearly the same."
-        )
+        notes.append(f"The past enters at one lag in {stride}, as neighbouring ones tell nearly the same.")
     largest = min((n_rows - 1) * len(recording.outputs), n_columns * n_references)
     if sweep:
         orders = [n for n in orders if n <= largest] or orders[:1]
@@ -175,16 +173,16 @@ def _sorted_orders(order: int | None, orders: Iterable[int] | None) -> list[int]
 
 
 def horizon_warning(modes: Modes, realization: Realization) -> tuple[str, ...]:
-    """One sentence when the horizon is shorter than half a period of the slowest light mode, else none."""
+    """One sentence when the horizon is shorter than a third of a period of the slowest light mode, or none."""
     light = modes.frequency_hz[(modes.damping_ratio > 0) & (modes.damping_ratio < 0.3)]
     if not light.size:
         return ()
     n_rows, rate = int(realization.settings["n_rows"]), 1 / realization.system.dt
-    if 2 * n_rows * light[0] >= rate:
+    if 3 * n_rows * light[0] >= rate:
         return ()
     return (
-        f"{n_rows} block rows span less than half a period of the mode at {light[0]:.4g} Hz, which is then "
-        f"mostly noise; take at least {math.ceil(rate / light[0])} block rows.",
+        f"{n_rows} block rows span less than a third of a period of the mode at {light[0]:.4g} Hz, which is "
+        f"then mostly noise; take about {math.ceil(2 / 3 * rate / light[0])} block rows.",
     )
 
 

@@ -63,7 +63,7 @@ def test_orders_follow_the_peaks_and_the_length():
 
 def test_rows_follow_the_slowest_peak_unless_something_else_asks_for_more():
     recording = ambient(20_000, 5)
-    assert choose_rows(recording, [2.0, 5.0], 14, 7)[0] == np.ceil(1 / DT / 2)
+    assert choose_rows(recording, [2.0, 5.0], 14, 7)[0] == np.ceil(2 / 3 / DT / 2)
     rows, reason = choose_rows(recording, [10.0], 40, 1)
     assert rows == 62
     assert "order 40" in reason

@@ -158,15 +158,15 @@ def test_leading_subspace_of_exact_data_keeps_the_small_values():
 
 def test_the_horizon_is_chosen_and_explained():
     realization = ssi_cov(ambient(20_000, 9))
-    # One period of 1.66 Hz is 22.3 samples; the bin of the peak may be 0.02 Hz off.
-    assert realization.settings["n_rows"] in (22, 23, 24)
-    assert any("one period of the lowest resonance peak" in note for note in realization.notes)
+    # Two thirds of a period of 1.66 Hz are 14.8 samples; the bin of the peak may be 0.02 Hz off.
+    assert realization.settings["n_rows"] == 15
+    assert any("two thirds of a period of the lowest resonance peak" in note for note in realization.notes)
     assert any("resonance peaks" in note for note in realization.notes)
 
 
 def test_too_short_a_horizon_is_noted():
     realization = ssi_cov(ambient(20_000, 10), order=14, n_rows=5)
-    assert any("less than half a period of the mode at 1.6" in note for note in realization.notes)
+    assert any("less than a third of a period of the mode at 1.6" in note for note in realization.notes)
     assert not horizon_warning(TRUTH, ssi_cov(ambient(20_000, 10), order=14, n_rows=12))
 
 
