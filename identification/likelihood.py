@@ -20,7 +20,8 @@ from identification.output_error import OutputError, output_error, simulated
 from identification.parameterizations import Parameterization
 from identification.recording import Array, Recording
 from identification.scoring import Noise, Optimum, maximize, noise_model, solve_linear
-from identification.systems import SecondOrder, StateSpace
+from identification.structures import LinearStructure, passive
+from identification.systems import Realization, SecondOrder, StateSpace
 from identification.whiteness import whiteness
 
 SUSPICIOUS = 1e-3
@@ -106,13 +107,31 @@ def refine(
 
     Source: Ljung (1999), System Identification, 2nd ed., sections 4.2 (output-error models) and 7.4.
     """
+    if isinstance(parameterization, LinearStructure) and isinstance(start, StateSpace | Realization):
+        # Modes can be refined from worse starts than the matrices that follow from them.
+        start = refine(
+            recording, start, initial_state=initial_state, noise_per_record=noise_per_record
+        ).system
     parameterization, theta = family(start, recording, parameterization)
     problem = output_error(recording, parameterization, theta, initial_state=initial_state)
     _require_enough_samples(problem)
+    theta, notes = _stable(problem, theta)
     q = np.concatenate([theta, np.zeros(problem.n_unknowns - problem.n_theta)])
     q = _with_best_linear(problem, parameterization, q)
     noise = noise_model(problem, per_record=noise_per_record)
-    return _estimate(problem, maximize(problem, noise, q, max_iterations=max_iterations), noise)
+    return _estimate(problem, maximize(problem, noise, q, max_iterations=max_iterations), noise, notes)
+
+
+def _stable(problem: OutputError, theta: Array) -> tuple[Array, tuple[str, ...]]:
+    """θ, or if its structure is unstable that of the nearest passive one, which says so."""
+    family_of_models = problem.parameterization
+    if not isinstance(family_of_models, LinearStructure):
+        return theta, ()
+    structure = family_of_models.matrices(theta).structure
+    if np.min(np.linalg.eigvalsh(structure.mass)) > 0 and problem.grows(theta) < 1:
+        return theta, ()
+    note = "The start was unstable, so what it had of negative mass, damping or stiffness was taken away."
+    return family_of_models.start(passive(structure)), (note,)
 
 
 def _with_best_linear(problem: OutputError, parameterization: Parameterization, q: Array) -> Array:
@@ -123,7 +142,7 @@ def _with_best_linear(problem: OutputError, parameterization: Parameterization, 
     return solve_linear(problem, q, which) if np.any(which) else q
 
 
-def _estimate(problem: OutputError, optimum: Optimum, noise: Noise) -> Estimate:
+def _estimate(problem: OutputError, optimum: Optimum, noise: Noise, notes: tuple[str, ...]) -> Estimate:
     """The optimum in the words of the user."""
     n_values = float(np.sum(problem.n_samples)) * len(problem.outputs)
     variance = noise.variance(optimum.squares)
@@ -148,7 +167,7 @@ def _estimate(problem: OutputError, optimum: Optimum, noise: Noise) -> Estimate:
         -noise.cost(optimum.squares) - 0.5 * n_values * (1 + np.log(2 * np.pi)),
         optimum.converged,
         optimum.n_iterations,
-        _notes(problem, optimum, blind, white),
+        notes + _notes(problem, optimum, blind, white),
     )
 
 

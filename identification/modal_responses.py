@@ -125,7 +125,7 @@ def hold(poles: Complex, system_dt: float, dt: float) -> Hold:
         return Hold(poles, one, one, 0 * one)
     x = poles * dt
     still = x == 0
-    h = np.where(still, one, np.expm1(x) / np.where(still, 1, x))
+    h = np.asarray(np.where(still, 1, np.expm1(x) / np.where(still, 1, x)), dtype=np.complex128)
     z: Complex = np.asarray(np.exp(x), dtype=np.complex128)
     return Hold(z, dt * h, dt * z, dt**2 * _slope(x))
 

@@ -68,16 +68,23 @@ class OutputError:
         """
         return self.parameterization.tangent(q[: self.n_theta], self.inputs, self.outputs)
 
+    def grows(self, q: Array) -> float:
+        """Largest exponent by which a response grows over the longest record, negative where all decay."""
+        system = self.tangent(q).system
+        poles = np.linalg.eigvals(system.A)
+        size = np.maximum(np.abs(poles), np.finfo(float).tiny)
+        rate = np.log(size) if system.dt else poles.real * self.runs[0].dt
+        return float(np.max(rate) * np.max(self.n_samples))
+
     def squares(self, q: Array) -> Array:
         """Sum of squared errors of each record and output, (n_records, n_outputs); infinite without a model."""
-        nowhere = np.full((len(self.runs), len(self.outputs)), np.inf)
         try:
-            system = self.tangent(q).system
-            if not self._bounded(system):
-                return nowhere
+            possible = self.grows(q) < MAX_GROWTH
         except np.linalg.LinAlgError:
-            return nowhere
-        predictions = simulated(system, self.runs, self.initial(q))
+            possible = False
+        if not possible:
+            return np.full((len(self.runs), len(self.outputs)), np.inf)
+        predictions = simulated(self.tangent(q).system, self.runs, self.initial(q))
         return np.stack(
             [np.sum((run.outputs - y) ** 2, axis=1) for run, y in zip(self.runs, predictions, strict=True)]
         )
@@ -104,14 +111,6 @@ class OutputError:
             information[np.ix_(rows, rows)] += H
             first += len(g) - self.n_theta
         return gradient, information
-
-    def _bounded(self, system: StateSpace) -> bool:
-        """Whether no response grows beyond all numbers within a record."""
-        poles = np.linalg.eigvals(system.A)
-        longest = np.max(self.n_samples)
-        size = np.maximum(np.abs(poles), np.finfo(float).tiny)
-        rate = np.log(size) if system.dt else poles.real * self.runs[0].dt
-        return bool(np.all(np.isfinite(poles)) and np.max(rate) * longest < MAX_GROWTH)
 
 
 def output_error(

@@ -198,6 +198,31 @@ def in_three_parts(
     return LinearStructure(names, known, patterns[:, 0], patterns[:, 1], patterns[:, 2])
 
 
+def passive(structure: SecondOrder) -> SecondOrder:
+    """The structure without what noise may add to it and nature cannot: negative mass, stiffness and damping.
+
+    Args:
+        structure: symmetric M, C_d and K.
+
+    Returns:
+        Eigenvalues of the mass (in units of its diagonal) raised to a hundredth of the largest at least, those of
+        the stiffness relative to the mass to a millionth, those of the damping to zero.
+    """
+    unit = np.sqrt(np.maximum(np.abs(np.diag(structure.mass)), np.finfo(float).tiny))
+    m, V = np.linalg.eigh(structure.mass / unit / unit[:, None])
+    V = V / unit[:, None] / np.sqrt(np.maximum(m, m[-1] / 100))  # Vᵀ M V = I
+    back = np.linalg.inv(V)
+
+    def raised(matrix: Array, share: float) -> Array:
+        k, W = np.linalg.eigh(V.T @ matrix @ V)
+        W = W.T @ back
+        return np.asarray((W.T * np.maximum(k, share * k[-1])) @ W)
+
+    return SecondOrder(
+        back.T @ back, raised(structure.damping, 0.0), raised(structure.stiffness, 1e-6), structure.dofs
+    )
+
+
 def channel_matrices(
     dofs: Sequence[str], inputs: Sequence[Channel], outputs: Sequence[Channel]
 ) -> tuple[Array, Array, Array, Array]:
