@@ -1,0 +1,170 @@
+"""From a recording to models by way of its spectra: what `plscf` is given, and the choices made on the way."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from identification.horizon import resonance_peaks
+from identification.plscf import plscf, response_rank
+from identification.recording import Recording
+from identification.spectra import FrequencyResponse, frequency_response, positive_spectra, unit_sizes
+from identification.systems import Realization
+
+LEFT = {"measured": 1e-3, "calculated": 1e-12}
+"""Share of its height to which an exponential window falls by the end of the response to a blow."""
+
+PERIODS = 8
+"""Periods of the lowest resonance that the output correlations last, unless told otherwise."""
+
+FALL = 3.0
+"""By how much the power falls behind a resonance."""
+
+LINE_VALUES = 60
+"""Squared responses averaged to tell a resonance from chance."""
+
+MARGIN = 2.0
+"""Upper edge of the band fitted, over the frequency where the highest resonance has faded."""
+
+
+def plscf_recording(
+    recording: Recording,
+    order: int | None = None,
+    *,
+    orders: Iterable[int] | None = None,
+    degree: int | None = None,
+    band: tuple[float, float] | None = None,
+    estimator: str = "H1",
+    n_segment: int | None = None,
+    decay: float | None = None,
+    references: Sequence[str] | None = None,
+    n_lags: int | None = None,
+) -> Realization:
+    """Poly-reference least-squares complex frequency models of a recording, with or without measured forces.
+
+    With forces the frequency responses are fitted, without them the positive spectra of the outputs, whose
+    models have no inputs. What is None is chosen from the data, with the reason in the notes.
+
+    Args:
+        recording: any kind of records.
+        order: number of states; all degrees are tried when None.
+        orders: as for `plscf`.
+        degree: as for `plscf`.
+        band: lowest and highest frequency fitted [Hz]; `resonance_band` when None, and all lines when the data
+            are free of noise.
+        estimator: as for `frequency_response`; of no account without forces.
+        n_segment: likewise.
+        decay: rate of the exponential window [1/s], which is undone in the models.
+        references: names of the reference outputs; of no account with forces.
+        n_lags: lags of the output correlations; likewise.
+
+    Raises:
+        IdentificationError: as for `frequency_response`, `positive_spectra` and `plscf`.
+
+    Source: Peeters, Van der Auweraer, Guillaume and Leuridan (2004), Shock Vib. 11, 395-409; for outputs
+        alone Peeters and Van der Auweraer (2005), Proc. 1st IOMAC.
+    """
+    peaks = resonance_peaks(recording)
+    forced = bool(recording.inputs) and all(record.inputs.shape[0] for record in recording.records)
+    if forced:
+        response = _forced_response(recording, estimator, n_segment, decay)
+    else:
+        response = _output_response(recording, peaks, references, n_lags, decay)
+    notes = response.notes
+    if band is None and (not forced or response_rank(response) is None):
+        band = resonance_band(response)
+        if band is not None:
+            notes = (
+                *notes,
+                f"Lines from {band[0]:.4g} to {band[1]:.4g} Hz are fitted: no resonance lies above.",
+            )
+    found = plscf(response, order, orders=orders, degree=degree, band=band)
+    settings = {**found.settings, "decay": response.decay}
+    if forced:
+        return replace(found, settings={**settings, "estimator": estimator}, notes=(*notes, *found.notes))
+    systems = tuple(
+        replace(system, B=system.B[:, :0], D=system.D[:, :0], inputs=()) for system in found.systems
+    )
+    settings["n_references"] = len(response.inputs)
+    return replace(found, systems=systems, settings=settings, notes=(*notes, *found.notes))
+
+
+def _forced_response(
+    recording: Recording, estimator: str, n_segment: int | None, decay: float | None
+) -> FrequencyResponse:
+    """Frequency responses; under an exponential window where a blow is all that drives the structure."""
+    if decay is not None:
+        return frequency_response(recording, estimator, n_segment=n_segment, decay=decay)
+    response = frequency_response(recording, estimator, n_segment=n_segment)
+    blows = {record.kind for record in recording.records} <= {"pulse", "impact"}
+    if not blows or n_segment is not None or response.n_averages < len(recording.inputs):
+        return response
+    left = LEFT["calculated" if response_rank(response) else "measured"]
+    duration = max(record.n_samples for record in recording.records) * recording.dt
+    windowed = frequency_response(recording, estimator, decay=-np.log(left) / duration)
+    note = (
+        f"An exponential window that falls to {left:g} makes all motion end within the record; it is undone."
+    )
+    return replace(windowed, notes=(*windowed.notes, note))
+
+
+def _output_response(
+    recording: Recording,
+    peaks: Sequence[float],
+    references: Sequence[str] | None,
+    n_lags: int | None,
+    decay: float | None,
+) -> FrequencyResponse:
+    """Positive spectra of a few periods of the lowest resonance, under an exponential window."""
+    notes: tuple[str, ...] = ()
+    if n_lags is None:
+        longest = max(record.n_samples for record in recording.records)
+        wanted = PERIODS * recording.sample_rate / peaks[0] if peaks else longest / 16
+        n_lags = max(int(min(max(wanted, 64), longest / 4)), 2)
+        why = (
+            f"about {PERIODS} periods of the lowest resonance peak, at {peaks[0]:.4g} Hz"
+            if peaks
+            else "no peak"
+        )
+        notes = (f"The output correlations are taken over {n_lags} lags: {why}.",)
+    if decay is None:
+        decay = 4.0 / (n_lags * recording.dt)
+        notes = (*notes, "An exponential window takes them down to 2 % at the last lag; it is undone.")
+    response = positive_spectra(recording, n_lags, references=references, decay=decay)
+    return replace(response, notes=notes)
+
+
+def resonance_band(response: FrequencyResponse) -> tuple[float, float] | None:
+    """From zero to well above the resonances, or all lines (None) where they reach up to half the sample rate.
+
+    The power of all responses is averaged over so many lines that its scatter is below a tenth. It falls
+    from the last resonance by a factor of three; twice the frequency where it does is the upper edge.
+
+    Returns:
+        Lowest and highest frequency [Hz], or None.
+    """
+    f, nyquist = response.frequency_hz, 0.5 / response.dt
+    low = 0.0 if f[0] < 0.1 * f[-1] else float(f[0])
+    high = min(MARGIN * _last_fall(response), float(f[-1]))
+    return None if high > 0.8 * nyquist and low == 0 else (low, high)
+
+
+def _last_fall(response: FrequencyResponse) -> float:
+    """Frequency by which the averaged power has fallen by a factor of three from its last peak [Hz]."""
+    size = unit_sizes(np.sum(np.abs(response.values) ** 2, axis=(0, 2)), response.outputs)
+    power = np.sum(np.abs(response.values / size[:, None]) ** 2, axis=(1, 2))
+    n_f, n_outputs, n_inputs = response.values.shape
+    m = min(-(-LINE_VALUES // (n_outputs * n_inputs)), max(n_f // 8, 1))
+    n = n_f // m
+    means = np.mean(power[: n * m].reshape(n, m), axis=1)
+    fall, extreme, climbing = n - 1, 0.0, True
+    for k, value in enumerate(means.tolist()):
+        if climbing and value * FALL < extreme:
+            fall, extreme, climbing = k, value, False
+        elif not climbing and value > FALL * extreme:
+            extreme, climbing = value, True
+        else:
+            extreme = max(extreme, value) if climbing else min(extreme, value)
+    return float(response.frequency_hz[(fall + 1) * m - 1])
