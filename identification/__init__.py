@@ -33,6 +33,7 @@ if TYPE_CHECKING:
     from identification.recording import Channel, Record, Recording
     from identification.second_order import second_order
     from identification.ssi import ssi_cov
+    from identification.ssi_data import ssi_data
     from identification.stability import Stabilization, stabilize
     from identification.systems import MarkovParameters, Realization, SecondOrder, StateSpace
 
@@ -54,6 +55,7 @@ _MODULES = {
     "recording": ("Channel", "Record", "Recording"),
     "second_order": ("second_order",),
     "ssi": ("ssi_cov",),
+    "ssi_data": ("ssi_data",),
     "stability": ("Stabilization", "stabilize"),
     "systems": ("MarkovParameters", "Realization", "SecondOrder", "StateSpace"),
 }
@@ -87,6 +89,7 @@ __all__ = [
     "output_covariances",
     "second_order",
     "ssi_cov",
+    "ssi_data",
     "stabilize",
 ]
 

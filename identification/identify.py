@@ -13,9 +13,9 @@ from identification.errors import NotSecondOrderError
 from identification.layout import layout
 from identification.methods import find_method
 from identification.modes import Modes
+from identification.output_only import horizon_warning
 from identification.recording import Recording
 from identification.second_order import second_order
-from identification.ssi import horizon_warning
 from identification.stability import Stabilization, stabilize
 from identification.systems import Realization, SecondOrder
 

@@ -13,6 +13,7 @@ from identification.okid import okid_era
 from identification.pulse import markov_parameters
 from identification.recording import Recording
 from identification.ssi import ssi_cov
+from identification.ssi_data import ssi_data
 from identification.systems import Realization
 
 
@@ -177,6 +178,14 @@ METHODS = {
             finds_order=False,
             kinds=("ambient", "random", "burst_random", "sweep", "multisine", "other"),
             summary="Stochastic subspace identification, from the covariances of the outputs alone.",
+        ),
+        Method(
+            name="ssi_data",
+            function=ssi_data,
+            needs_inputs=False,
+            finds_order=False,
+            kinds=("ambient", "random", "burst_random", "sweep", "multisine", "other"),
+            summary="Stochastic subspace identification, from a projection of the outputs themselves.",
         ),
     )
 }

@@ -43,4 +43,4 @@ def test_modules_do_not_hide_functions_of_the_same_name():
 
 def test_an_unknown_name_is_told():
     with pytest.raises(AttributeError, match="ssi_cov"):
-        identification.ssi_dat  # noqa: B018
+        identification.ssi_date  # noqa: B018

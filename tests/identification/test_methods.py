@@ -12,12 +12,12 @@ from identification.systems import Realization
 from tests.ambient import ambient, output_record
 from tests.systems import chain3, chain7, noisy, paper_chain3, pulse_recording, recorded
 
-KIND_OF = {"era": "pulse", "okid_era": "random", "ssi_cov": "ambient"}
+KIND_OF = {"era": "pulse", "okid_era": "random", "ssi_cov": "ambient", "ssi_data": "ambient"}
 
 
 def suited(method):
     """A recording that the method is made for, and the frequencies behind it."""
-    if method.name == "ssi_cov":
+    if KIND_OF[method.name] == "ambient":
         return ambient(20_000, 0), chain7().modes().frequency_hz
     truth = chain3().modes().frequency_hz
     if method.name == "okid_era":
@@ -45,7 +45,7 @@ def test_it_finds_a_structure_at_a_given_order(method):
     assert realization.method == method.name
     assert realization.orders == (2 * frequency_hz.size,)
     # Exact but for the scatter of outputs alone, three times 0.2 %.
-    accuracy = 1e-2 if method.name == "ssi_cov" else 1e-9
+    accuracy = 1e-2 if KIND_OF[method.name] == "ambient" else 1e-9
     np.testing.assert_allclose(realization.system.modes().frequency_hz, frequency_hz, rtol=accuracy)
 
 
@@ -63,7 +63,7 @@ def test_it_ignores_no_setting(method):
 
 
 def test_an_unknown_name_is_told_with_those_that_exist():
-    with pytest.raises(IdentificationError, match=r"'eera' does not exist; there are era, okid_era, ssi_cov"):
+    with pytest.raises(IdentificationError, match=r"'eera' does not exist; there are era, okid_era, ssi_cov, ssi_data"):
         find_method("eera")
 
 

@@ -7,13 +7,14 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from identification import ssi
+from identification import output_only
 from identification.covariance import output_covariances
 from identification.errors import IdentificationError, OrderError, RecordingError, TooShortError
 from identification.hankel import block_hankel, shift_invariance
 from identification.modes import mac
+from identification.output_only import horizon_warning, leading_subspace
 from identification.recording import Channel, Recording
-from identification.ssi import horizon_warning, leading_subspace, ssi_cov
+from identification.ssi import ssi_cov
 from identification.systems import StateSpace
 from tests.ambient import DT, ambient, output_record
 from tests.systems import chain7
@@ -127,7 +128,7 @@ def test_several_records_count_as_one_measurement():
 def test_thinning_the_past_keeps_the_modes(monkeypatch):
     recording = ambient(40_000, 6, dt=DT / 4)
     full = ssi_cov(recording, order=14, n_rows=80)
-    monkeypatch.setattr(ssi, "MAX_COLUMNS", 140)
+    monkeypatch.setattr(output_only, "MAX_COLUMNS", 140)
     thin = ssi_cov(recording, order=14, n_rows=80)
     assert (full.settings["stride"], thin.settings["stride"]) == (1, 4)
     # Both within the scatter of the data of some 0.3 %.

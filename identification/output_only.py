@@ -1,0 +1,194 @@
+"""What output-only subspace methods share: the Hankel matrix they need, and the models that it gives."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable, Sequence
+from dataclasses import replace
+from typing import NamedTuple
+
+import numpy as np
+import scipy.linalg
+
+from identification.errors import IdentificationError, OrderError
+from identification.hankel import shift_invariance
+from identification.horizon import MAX_COLUMNS, choose_orders, choose_rows, resonance_peaks
+from identification.modes import Modes
+from identification.recording import Array, Recording
+from identification.systems import Realization, StateSpace
+
+
+class Plan(NamedTuple):
+    """Orders to realize, and the Hankel matrix to realize them from.
+
+    Attributes:
+        orders: rising.
+        swept: whether the data, not the caller, set the orders.
+        n_rows: block rows: the future.
+        n_columns: block columns: the past.
+        stride: lags from one block column to the next.
+        n_references: references in a block column.
+        notes: what was chosen and why.
+    """
+
+    orders: list[int]
+    swept: bool
+    n_rows: int
+    n_columns: int
+    stride: int
+    n_references: int
+    notes: tuple[str, ...]
+
+    @property
+    def past(self) -> range:
+        """Lags at which the block columns begin."""
+        return range(0, self.stride * self.n_columns, self.stride)
+
+    def settings(self) -> dict[str, int | float | str]:
+        """The horizon, by name."""
+        names = ("n_rows", "n_columns", "stride", "n_references")
+        return {name: getattr(self, name) for name in names}
+
+
+def plan_hankel(
+    recording: Recording,
+    order: int | None,
+    orders: Iterable[int] | None,
+    n_rows: int | None,
+    n_references: int,
+) -> Plan:
+    """The plan with what is None chosen from the data.
+
+    Raises:
+        OrderError: an order below 1, or above what the Hankel matrix can carry.
+        IdentificationError: fewer than two block rows.
+    """
+    notes: list[str] = []
+    wanted = _sorted_orders(order, orders)
+    sweep = not wanted
+    peaks = resonance_peaks(recording) if sweep or n_rows is None else []
+    if sweep:
+        wanted, reason = choose_orders(recording, len(peaks))
+        notes.append(reason)
+    if n_rows is None:
+        n_rows, reason = choose_rows(recording, peaks, wanted[-1], n_references)
+        notes.append(reason)
+    elif n_rows < 2:
+        raise IdentificationError(f"{n_rows} block rows were asked for; expected at least 2")
+    stride = -(-n_rows * n_references // MAX_COLUMNS)
+    n_columns = -(-n_rows // stride)
+    if stride > 1:
+        notes.append(f"The past enters at one lag in {stride}, as neighbouring ones tell nearly the same.")
+    largest = min((n_rows - 1) * len(recording.outputs), n_columns * n_references)
+    if sweep:
+        wanted = [n for n in wanted if n <= largest] or wanted[:1]
+    if wanted[-1] > largest:
+        raise OrderError(
+            f"order {wanted[-1]} exceeds {largest}, the most that {n_rows} block rows of {len(recording.outputs)} "
+            f"outputs with {n_references} references carry; lower the order or take more block rows"
+        )
+    return Plan(wanted, sweep, n_rows, n_columns, stride, n_references, tuple(notes))
+
+
+def realized(
+    method: str,
+    recording: Recording,
+    order: int | None,
+    plan: Plan,
+    H: Array,
+    scale: Array,
+) -> Realization:
+    """Models of every order of the plan, from the leading left subspace of a matrix O X.
+
+    Args:
+        method: name of the method.
+        recording: where the outputs come from.
+        order: the one to choose; where the singular values drop most steeply when None.
+        plan: orders and horizon.
+        H: product of the observability matrix O and something else, (n_rows * n_outputs, n_columns *
+            n_references).
+        scale: what the outputs were divided by, shape (n_outputs, 1).
+
+    Raises:
+        OrderError: an order exceeds the rank of H.
+    """
+    U, singular_values = leading_subspace(H, plan.orders[-1] + 2)
+    rank = int(np.sum(singular_values > np.finfo(float).eps * max(H.shape) * singular_values[0]))
+    wanted = [n for n in plan.orders if n <= rank] if plan.swept else plan.orders
+    if not wanted or wanted[-1] > rank:
+        raise OrderError(
+            f"order {plan.orders[-1]} exceeds {rank}, the numerical rank of the outputs; "
+            "lower the order, or check the channels where the rank is zero"
+        )
+    systems = tuple(
+        _outputs_only(A, C * scale, recording)
+        for A, C in shift_invariance(U, singular_values, n_outputs=len(scale), orders=wanted)
+    )
+    notes = plan.notes
+    if order is None:
+        order = _largest_gap(singular_values, wanted)
+        notes += (f"The singular values drop most steeply after the first {order}.",)
+    found = Realization(method, systems, singular_values, order, plan.settings(), notes)
+    return replace(found, notes=(*notes, *horizon_warning(found.system.modes(), found)))
+
+
+def leading_subspace(H: Array, n: int) -> tuple[Array, Array]:
+    """Leading left singular vectors of a matrix and their singular values, largest first.
+
+    The eigenvectors of H Hᵀ or Hᵀ H, whichever is smaller, cost a fraction of a singular value
+    decomposition, but squaring loses singular values below √ε of the largest. When one of those asked for
+    is that small, the data are nearly free of noise and the decomposition of H itself follows.
+
+    Args:
+        H: shape (n_rows, n_columns).
+        n: how many; at most all.
+
+    Returns:
+        U, shape (n_rows, n), and the singular values, shape (n,).
+    """
+    small = min(H.shape)
+    n = min(n, small)
+    wide = H.shape[0] <= H.shape[1]
+    G = H @ H.T if wide else H.T @ H
+    subset = (small - n, small - 1) if 6 * n < small else None  # otherwise all cost less
+    w, V = scipy.linalg.eigh(G, subset_by_index=subset, overwrite_a=True, check_finite=False)
+    w, V = w[::-1][:n], V[:, ::-1][:, :n]
+    if w[-1] <= 1e3 * small * np.finfo(float).eps * w[0]:
+        U, s, _ = scipy.linalg.svd(H, full_matrices=False, check_finite=False)
+        return U[:, :n], s[:n]
+    s = np.sqrt(w)
+    return (V if wide else H @ (V / s)), s
+
+
+def _outputs_only(A: Array, C: Array, recording: Recording) -> StateSpace:
+    n = len(A)
+    return StateSpace(A, np.zeros((n, 0)), C, np.zeros((len(C), 0)), recording.dt, (), recording.outputs)
+
+
+def _sorted_orders(order: int | None, orders: Iterable[int] | None) -> list[int]:
+    """Orders asked for, rising; empty when the data are to decide."""
+    wanted = sorted({*(() if orders is None else orders), *(() if order is None else (order,))})
+    if (orders is not None and not wanted) or any(n < 1 for n in wanted):
+        raise OrderError(f"orders are {wanted}; expected whole numbers from 1 on")
+    return wanted
+
+
+def horizon_warning(modes: Modes, realization: Realization) -> tuple[str, ...]:
+    """One sentence when the horizon is shorter than a third of a period of the slowest light mode, or none."""
+    light = modes.frequency_hz[(modes.damping_ratio > 0) & (modes.damping_ratio < 0.3)]
+    if not light.size:
+        return ()
+    n_rows, rate = int(realization.settings["n_rows"]), 1 / realization.system.dt
+    if 3 * n_rows * light[0] >= rate:
+        return ()
+    return (
+        f"{n_rows} block rows span less than a third of a period of the mode at {light[0]:.4g} Hz, which is "
+        f"then mostly noise; take about {math.ceil(2 / 3 * rate / light[0])} block rows.",
+    )
+
+
+def _largest_gap(singular_values: Array, orders: Sequence[int]) -> int:
+    """The order after which the singular values fall by the largest factor."""
+    s = np.maximum(singular_values, np.finfo(float).tiny)
+    n = np.array([order for order in orders if order < s.size] or orders[:1])
+    return int(n[np.argmax(s[n - 1] / s[np.minimum(n, s.size - 1)])])
