@@ -20,7 +20,7 @@ from identification.output_error import OutputError, output_error, simulated
 from identification.parameterizations import Parameterization
 from identification.recording import Array, Recording
 from identification.scoring import Noise, Optimum, maximize, noise_model, solve_linear
-from identification.structures import LinearStructure, passive
+from identification.structures import LinearStructure
 from identification.systems import Realization, SecondOrder, StateSpace
 from identification.whiteness import whiteness
 
@@ -123,15 +123,11 @@ def refine(
 
 
 def _stable(problem: OutputError, theta: Array) -> tuple[Array, tuple[str, ...]]:
-    """θ, or if its structure is unstable that of the nearest passive one, which says so."""
-    family_of_models = problem.parameterization
-    if not isinstance(family_of_models, LinearStructure):
+    """θ, or a stable one nearby if its model grows within the records, which is then said."""
+    models = problem.parameterization
+    if not isinstance(models, LinearStructure | ModalParameters) or problem.grows(theta) < 1:
         return theta, ()
-    structure = family_of_models.matrices(theta).structure
-    if np.min(np.linalg.eigvalsh(structure.mass)) > 0 and problem.grows(theta) < 1:
-        return theta, ()
-    note = "The start was unstable, so what it had of negative mass, damping or stiffness was taken away."
-    return family_of_models.start(passive(structure)), (note,)
+    return models.stable(theta), ("The start was unstable; the search began from a stable model nearby.",)
 
 
 def _with_best_linear(problem: OutputError, parameterization: Parameterization, q: Array) -> Array:

@@ -41,6 +41,7 @@ class ModalParameters:
         values: the parameters of the given model.
         unknown: which ones the given model did not tell: participation and direct terms of inputs that it
             lacks. The outputs are linear in them.
+        poles: positions of the real and imaginary part of each pole, -1 where it is real.
     """
 
     names: tuple[str, ...]
@@ -48,10 +49,22 @@ class ModalParameters:
     slope: Tangent
     values: Array
     unknown: NDArray[np.bool_]
+    poles: tuple[tuple[int, int], ...]
 
     def start(self, model: Any) -> Array:
         """The parameters of the model that this was made from, or θ itself when that is given."""
         return start_values(model, self.names) if isinstance(model, np.ndarray) else self.values
+
+    def stable(self, theta: Array) -> Array:
+        """θ with growing poles turned into decaying ones: reflected at the unit circle or the imaginary axis."""
+        theta = theta.copy()
+        for real, imag in self.poles:
+            z = complex(theta[real], 0.0 if imag < 0 else theta[imag])
+            z = z / max(abs(z) ** 2, 1.0) if self.origin.dt else complex(-abs(z.real), z.imag)
+            theta[real] = z.real
+            if imag >= 0:
+                theta[imag] = z.imag
+        return theta
 
     def tangent(self, theta: Array, inputs: Sequence[Channel], outputs: Sequence[Channel]) -> Tangent:
         """The model at θ, with its derivatives.
@@ -154,6 +167,7 @@ class _Builder:
         self.values: list[float] = []
         self.unknown: list[bool] = []
         self.entries: list[list[Entry]] = []
+        self.poles: list[tuple[int, int]] = []
         self.state = 0
 
     def add(self, name: str, value: float, entries: list[Entry], *, known: bool = True) -> None:
@@ -167,7 +181,8 @@ class _Builder:
         z, c, b, k = self.parts.z[i], self.parts.c[:, i], self.parts.b[i], self.state
         parts = [("Re", 0, 1.0), ("Im", 1, -1.0)][: 2 if z.imag else 1]
         self.state += len(parts)
-        name = f"pole {i + 1}"
+        name, here = f"pole {i + 1}", len(self.names)
+        self.poles.append((here, here + 1 if z.imag else -1))
         self.add(f"Re {name}", z.real, [("A", k + part, k + part, 1.0) for _, part, _ in parts])
         if z.imag:
             self.add(f"Im {name}", z.imag, [("A", k, k + 1, -1.0), ("A", k + 1, k, 1.0)])
@@ -193,4 +208,6 @@ class _Builder:
         origin = StateSpace(A, B, C, D, self.parts.dt, self.inputs, self.outputs)
         slope = Tangent(origin, d["A"], d["B"], d["C"], d["D"])
         unknown = np.array(self.unknown, dtype=bool)
-        return ModalParameters(tuple(self.names), origin, slope, np.array(self.values), unknown)
+        return ModalParameters(
+            tuple(self.names), origin, slope, np.array(self.values), unknown, tuple(self.poles)
+        )

@@ -1,9 +1,10 @@
 """Responses of a state space and of all its derivatives at once, mode by mode and exact for held inputs.
 
 With A = Φ Λ Φ⁻¹ the outputs are sums of modal responses r, each the answer of one pole to one input. To first
-order a change of parameters mixes the r, where it turns eigenvectors, and adds their derivatives s = ∂r/∂λ,
-where it moves poles. So few signals span the derivatives with respect to any number of parameters, and the
-normal equations need no more of the data than the products of these signals.
+order a change of parameters mixes the r, where it turns eigenvectors, and adds the divided differences
+d = (r_a - r_b) / (λ_a - λ_b) of poles that are close, ∂r/∂λ of each with itself among them. So few signals span
+the derivatives with respect to any number of parameters, and the normal equations need no more of the data than
+the products of these signals.
 """
 
 from __future__ import annotations
@@ -19,6 +20,7 @@ from numpy.typing import NDArray
 from identification.parameterizations import Tangent
 from identification.recording import Array
 from identification.systems import StateSpace
+from identification.zero_order_hold import divided_hold, hold
 
 Complex = NDArray[np.complex128]
 BLOCK = 1 << 14
@@ -49,6 +51,7 @@ class Spectrum(NamedTuple):
         phi: eigenvectors Φ, shape (n_states, n_states).
         phi_inv: Φ⁻¹.
         own: positions of the poles that stand for themselves and their conjugates.
+        partner: position of the conjugate of each pole, shape (n_states,).
         twice: 2 for the poles that do, 1 for real ones, shape (n_own,).
     """
 
@@ -56,36 +59,48 @@ class Spectrum(NamedTuple):
     phi: Complex
     phi_inv: Complex
     own: NDArray[np.intp]
+    partner: NDArray[np.intp]
     twice: Array
 
 
-class Hold(NamedTuple):
-    """r⁺ = z r + h u for a held input u, and the derivatives of z and h with respect to the pole."""
+class Pairs(NamedTuple):
+    """Poles so close that their responses cannot be told apart, each with itself included; one of conjugates.
 
-    z: Complex
-    h: Complex
-    dz: Complex
-    dh: Complex
+    Attributes:
+        near: whether two poles are close, shape (n_states, n_states).
+        a: positions of the first ones, shape (n_pairs,).
+        b: positions of the second ones.
+        twice: 2 for pairs that stand for their conjugates too, 1 for others.
+    """
+
+    near: NDArray[np.bool_]
+    a: NDArray[np.intp]
+    b: NDArray[np.intp]
+    twice: Array
 
 
 def spectrum(system: StateSpace) -> Spectrum | None:
     """Poles and eigenvectors; None where A has too few eigenvectors to work with, as at a critical damping."""
-    poles, phi = scipy.linalg.eig(system.A)
-    balanced = phi / np.maximum(np.linalg.norm(phi, axis=1, keepdims=True), np.finfo(float).tiny)
-    balanced /= np.linalg.norm(balanced, axis=0)
-    if np.linalg.cond(balanced) > ILL_CONDITIONED:
+    # In balanced coordinates the units of the states have no say in the condition number.
+    balanced, (scale, _) = scipy.linalg.matrix_balance(system.A, permute=False, separate=True)
+    poles, phi = scipy.linalg.eig(balanced)
+    if np.linalg.cond(phi) > ILL_CONDITIONED:
         return None
+    phi = scale[:, None] * phi
     own = np.flatnonzero(poles.imag >= 0)
+    # Of a real matrix, conjugates come side by side, the one with positive imaginary part first.
+    partner = np.arange(poles.size)
+    up = np.flatnonzero(poles.imag > 0)
+    partner[up], partner[up + 1] = up + 1, up
     twice = np.where(poles[own].imag > 0, 2.0, 1.0)
-    return Spectrum(
-        poles.astype(complex), phi.astype(complex), np.linalg.inv(phi).astype(complex), own, twice
-    )
+    phi_inv = np.linalg.inv(phi).astype(complex)
+    return Spectrum(poles.astype(complex), phi.astype(complex), phi_inv, own, partner, twice)
 
 
 def simulate(system: StateSpace, modes: Spectrum, run: Run, initial: Array | None) -> Array:
     """Outputs under the inputs of the run and from the initial state, shape (n_outputs, n_samples)."""
     weights = _prediction(system, modes, run, initial)
-    blocks = [weights @ X for _, X in _signals(system, modes, run, initial is not None, derivative=False)]
+    blocks = [weights @ X for _, X in _signals(system, modes, run, initial is not None, None)]
     return np.concatenate(blocks, axis=1)
 
 
@@ -105,68 +120,69 @@ def normal_equations(
         Shapes (n,) and (n, n), where n counts the parameters and the states of `initial`.
     """
     predict = _prediction(tangent.system, modes, run, initial)
+    pairs = close_pairs(modes, tangent.system.dt, run)
     G: Array = np.zeros(())  # products of the signals among themselves, (n_signals, n_signals)
     V: Array = np.zeros(())  # and with the residuals, (n_signals, n_outputs)
-    for where, X in _signals(tangent.system, modes, run, initial is not None, derivative=True):
+    for where, X in _signals(tangent.system, modes, run, initial is not None, pairs):
         residual = run.outputs[:, where] - predict @ X[: predict.shape[1]]
         G = G + X @ X.T
         V = V + X @ residual.T
     gradient, information = 0.0, 0.0
-    for o, T in enumerate(_coefficients(tangent, modes, run, initial)):
+    for o, T in enumerate(_coefficients(tangent, modes, run, initial, pairs)):
         gradient = gradient + weights[o] * (T @ V[:, o])
         information = information + weights[o] * (T @ G @ T.T)
     return np.asarray(gradient), np.asarray(information)
 
 
-def hold(poles: Complex, system_dt: float, dt: float) -> Hold:
-    """How each pole answers an input held over dt: h = (e^λdt - 1) / λ, and z with h = 1 when sampled."""
-    one = np.ones(poles.shape, dtype=np.complex128)
-    if system_dt:
-        return Hold(poles, one, one, 0 * one)
-    x = poles * dt
-    still = x == 0
-    h = np.asarray(np.where(still, 1, np.expm1(x) / np.where(still, 1, x)), dtype=np.complex128)
-    z: Complex = np.asarray(np.exp(x), dtype=np.complex128)
-    return Hold(z, dt * h, dt * z, dt**2 * _slope(x))
+def close_pairs(modes: Spectrum, system_dt: float, run: Run) -> Pairs:
+    """Pairs of poles that drift apart by less than a hundredth while their responses last.
 
-
-def _slope(x: Complex) -> Complex:
-    """Derivative of (eˣ - 1) / x: (eˣ - (eˣ - 1) / x) / x, near zero by its series Σ xᵏ / (k! (k + 2))."""
-    small = np.abs(x) < 0.5
-    far = np.where(small, 1, x)
-    slope = (np.exp(far) - np.expm1(far) / far) / far
-    near = np.where(small, x, 0)
-    series, term = np.zeros_like(x), np.ones_like(x)
-    for k in range(18):
-        series = series + term / (k + 2)
-        term = term * near / (k + 1)
-    return np.where(small, series, slope)
+    Others may be divided by their difference: squared, as in the information, that costs four digits.
+    """
+    poles = modes.poles
+    size = np.maximum(np.abs(poles), np.finfo(float).tiny)
+    rate = np.minimum(np.abs(np.log(size)), 1) if system_dt else np.abs(poles.real)
+    lasting = run.outputs.shape[1] * (1.0 if system_dt else run.dt)
+    near = np.abs(poles[:, None] - poles) < 1e-2 * (rate + 1 / lasting)
+    near |= near.T
+    a, b, twice = [], [], []
+    for i, j in zip(*np.nonzero(np.triu(near)), strict=True):
+        conjugate = sorted((modes.partner[i], modes.partner[j]))
+        if [i, j] <= conjugate:
+            a.append(i)
+            b.append(j)
+            twice.append(1.0 if [i, j] == conjugate else 2.0)
+    return Pairs(near, np.array(a), np.array(b), np.array(twice))
 
 
 def _signals(
-    system: StateSpace, modes: Spectrum, run: Run, released: bool, *, derivative: bool
+    system: StateSpace, modes: Spectrum, run: Run, released: bool, pairs: Pairs | None
 ) -> Iterator[tuple[slice, Array]]:
-    """Blocks of Re r and Im r of each own pole and source, the inputs themselves, then Re s and Im s.
+    """Blocks of Re r and Im r of each own pole and source, the inputs themselves, then Re d and Im d of each pair.
 
     Sources are the active inputs and, when `released`, the initial state.
     """
-    k = hold(modes.poles[modes.own], system.dt, run.dt)
     n_inputs, n_samples = run.inputs.shape
-    n_sources = n_inputs + released
-    r_next = np.zeros((len(k.z), n_sources), dtype=complex)
+    z, h = hold(modes.poles, system.dt, run.dt)
+    r_next = np.zeros((len(z), n_inputs + released), dtype=complex)
     r_next[:, n_inputs:] = 1
-    s_next = np.zeros_like(r_next)
-    for first in range(0, n_samples, BLOCK):
-        where = slice(first, min(first + BLOCK, n_samples))
+    first, second = (pairs.a, pairs.b) if pairs else (np.zeros(0, dtype=np.intp),) * 2
+    dz, dh = divided_hold(modes.poles[first], modes.poles[second], system.dt, run.dt)
+    d_next = np.zeros((len(first), n_inputs + released), dtype=complex)
+    for start in range(0, n_samples, BLOCK):
+        where = slice(start, min(start + BLOCK, n_samples))
         u = run.inputs[:, where]
         forcing = np.concatenate([u, np.zeros((int(released), u.shape[1]))])
-        r = np.empty((len(k.z), n_sources, u.shape[1]), dtype=complex)
-        s = np.empty_like(r if derivative else r[:0])
-        for i in range(len(k.z)):
-            r[i], r_next[i] = recursion(k.z[i], k.h[i] * forcing, r_next[i])
-            if derivative:
-                s[i], s_next[i] = recursion(k.z[i], k.dz[i] * r[i] + k.dh[i] * forcing, s_next[i])
-        yield where, np.concatenate([_rows(r.real), _rows(r.imag), u, _rows(s.real), _rows(s.imag)])
+        r = np.empty((len(z), *forcing.shape), dtype=complex)
+        for i in modes.own:
+            r[i], r_next[i] = recursion(z[i], h[i] * forcing, r_next[i])
+        r[modes.partner[modes.own]] = r[modes.own].conj()
+        d = np.empty((len(first), *forcing.shape), dtype=complex)
+        for k, (a, b) in enumerate(zip(first, second, strict=True)):
+            # r_a - r_b obeys the recursion of r_a, driven by what sets the two apart.
+            d[k], d_next[k] = recursion(z[a], dz[k] * r[b] + dh[k] * forcing, d_next[k])
+        own = r[modes.own]
+        yield where, np.concatenate([_rows(own.real), _rows(own.imag), u, _rows(d.real), _rows(d.imag)])
 
 
 def _rows(x: Array) -> Array:
@@ -198,35 +214,38 @@ def _beta(system: StateSpace, modes: Spectrum, run: Run, initial: Array | None) 
     return modes.phi_inv @ sources
 
 
-def _coefficients(tangent: Tangent, modes: Spectrum, run: Run, initial: Array | None) -> Iterator[Array]:
+def _coefficients(
+    tangent: Tangent, modes: Spectrum, run: Run, initial: Array | None, pairs: Pairs
+) -> Iterator[Array]:
     """What each signal counts in the derivatives of each output, shape (n_parameters, n_signals).
 
-    Source: first-order perturbation of eigenvalues and eigenvectors; poles closer than rounding allows to tell
-    apart share the mean of their s, which is the divided difference of r to second order in the distance.
+    Source: first-order perturbation of eigenvalues and eigenvectors: γ (s - Λ)⁻¹ ∂A (s - Λ)⁻¹ β in partial
+    fractions, but for close poles.
     """
     system, own = tangent.system, modes.own
-    extra = 0 if initial is None else system.n_states
     dA = modes.phi_inv @ tangent.A_theta @ modes.phi
-    near = _near(modes.poles, system.dt, run)
     gap = modes.poles[:, None] - modes.poles
-    turn = np.where(near, 0, 1 / np.where(near, 1, gap))
+    turn = np.where(pairs.near, 0, 1 / np.where(pairs.near, 1, gap))
     gamma, beta = system.C @ modes.phi, _beta(system, modes, run, initial)
-    d_sources = tangent.B_theta[:, :, run.active]
+    sources = tangent.B_theta[:, :, run.active]
     if initial is not None:
-        d_sources = np.concatenate([d_sources, np.zeros((*d_sources.shape[:2], 1))], axis=2)
+        sources = np.concatenate([sources, np.zeros((*sources.shape[:2], 1))], axis=2)
     d_gamma = (tangent.C_theta @ modes.phi + gamma @ (dA * turn.T))[:, :, own]
-    d_beta = (modes.phi_inv @ d_sources + (dA * turn) @ beta)[:, own]
-    s_gamma = (gamma @ (dA * near))[:, :, own] / 2
-    s_beta = ((dA * near) @ beta)[:, own] / 2
-    gamma, beta = gamma[:, own], beta[own]
+    d_beta = (modes.phi_inv @ sources + (dA * turn) @ beta)[:, own]
+    a, b = pairs.a, pairs.b
+    half = np.where(a == b, 0.5, 1.0) * pairs.twice
+    d_ab, d_ba = dA[:, a, b] * half, dA[:, b, a] * half
     twice = modes.twice[:, None]
     for o in range(len(gamma)):
-        g = gamma[o, :, None] * twice
-        r = d_gamma[:, o, :, None] * twice * beta + g * d_beta  # (n_parameters, n_own, n_sources)
-        s = s_gamma[:, o, :, None] * twice * beta + g * s_beta
-        parts = (r.real, -r.imag, tangent.D_theta[:, o, run.active], s.real, -s.imag)
+        g = gamma[o, own, None] * twice
+        r = d_gamma[:, o, :, None] * twice * beta[own] + g * d_beta  # (n_parameters, n_own, n_sources)
+        d = (gamma[o, a] * d_ab)[:, :, None] * beta[b] + (gamma[o, b] * d_ba)[:, :, None] * beta[a]
+        parts = (r.real, -r.imag, tangent.D_theta[:, o, run.active], d.real, -d.imag)
         T = np.concatenate([x.reshape(len(r), -1) for x in parts], axis=1)
-        yield np.concatenate([T, _of_initial(g * modes.phi_inv[own], beta.shape, T.shape[1])]) if extra else T
+        if initial is None:
+            yield T
+        else:
+            yield np.concatenate([T, _of_initial(g * modes.phi_inv[own], r.shape[1:], T.shape[1])])
 
 
 def _of_initial(answer: Complex, sources: tuple[int, ...], n_signals: int) -> Array:
@@ -237,11 +256,3 @@ def _of_initial(answer: Complex, sources: tuple[int, ...], n_signals: int) -> Ar
     T = np.zeros((answer.shape[1], n_signals))
     T[:, :size], T[:, size : 2 * size] = (x.reshape(len(rows), -1) for x in (rows.real, -rows.imag))
     return T
-
-
-def _near(poles: Complex, system_dt: float, run: Run) -> NDArray[np.bool_]:
-    """Pairs of poles (and each with itself) that do not drift apart while their responses last."""
-    size = np.maximum(np.abs(poles), np.finfo(float).tiny)
-    rate = np.minimum(np.abs(np.log(size)), 1) if system_dt else np.abs(poles.real)
-    lasting = run.outputs.shape[1] * (1.0 if system_dt else run.dt)
-    return np.asarray(np.abs(poles[:, None] - poles) < 1e-5 * (rate + 1 / lasting))

@@ -142,6 +142,10 @@ class LinearStructure:
             rhs.append(target.ravel() / unit)
         return np.asarray(np.linalg.lstsq(np.vstack(rows), np.concatenate(rhs), rcond=None)[0])
 
+    def stable(self, theta: Array) -> Array:
+        """The θ that comes closest to the structure at θ made `passive`."""
+        return self.start(passive(self.matrices(theta).structure))
+
     def matrices(self, theta: Array) -> StructureTangent:
         """The matrices at θ and their patterns."""
         M, C, K = (
