@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
+import itertools
+import math
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, fields
 from typing import ClassVar
 
 import numpy as np
+import scipy.integrate
 import scipy.signal
 
 from identification.recording import Array
@@ -15,6 +18,9 @@ from lab.rig import Rig
 
 BLOCK = 4096
 """Samples per block of a load; fixed, so that no result depends on how a simulation cuts its work."""
+
+FILTER_ORDER = 6
+"""Order of the Butterworth filter at each edge of a band."""
 
 Blocks = Iterator[tuple[Array, Array | None]]
 
@@ -31,6 +37,8 @@ class Load:
         position: displacement from the operating point at the start, shape (n_dofs,) [m or rad].
         velocity: shape (n_dofs,) [m/s or rad/s].
         measured: whether the inputs are recorded.
+        number: of the record in its recording.
+        whole: samples of the whole record, where this is only its start; 0 where it is all of it.
     """
 
     kind: str
@@ -39,6 +47,13 @@ class Load:
     position: Array
     velocity: Array
     measured: bool = True
+    number: int = 0
+    whole: int = 0
+
+    @property
+    def n_record(self) -> int:
+        """Samples of the whole record."""
+        return self.whole or self.n_samples
 
 
 @dataclass(frozen=True)
@@ -73,6 +88,7 @@ class Pulse(Excitation):
     amplitude: float = 1.0
 
     def loads(self, rig: Rig, sampling: Sampling, rng: np.random.Generator) -> list[Load]:
+        _require(self)
         shape = np.zeros(sampling.n_samples)
         shape[0] = self.amplitude
         return _one_by_one(self.kind, rig, shape)
@@ -88,6 +104,12 @@ class Impact(Excitation):
     start: float = 0.0
 
     def loads(self, rig: Rig, sampling: Sampling, rng: np.random.Generator) -> list[Load]:
+        _require(self, above_zero=("width",), from_zero=("start",))
+        if (self.start + self.width) * sampling.sample_rate > sampling.n_samples:
+            raise LabError(
+                f"the blow ends at {self.start + self.width:.6g} s, after the record of "
+                f"{sampling.n_samples / sampling.sample_rate} s; strike earlier or record longer"
+            )
         edges = np.arange(sampling.n_samples + 1) / sampling.sample_rate
         phase = np.clip((edges - self.start) / self.width, 0, 1) * np.pi
         # A sample holds the mean force, so that the blow keeps its momentum however short it is.
@@ -108,6 +130,7 @@ class Sweep(Excitation):
     law: str = "linear"
 
     def loads(self, rig: Rig, sampling: Sampling, rng: np.random.Generator) -> list[Load]:
+        _require(self)
         low, high = _band(self.band, sampling)
         if self.law not in ("linear", "logarithmic"):
             raise LabError(f"sweep law is {self.law!r}; expected 'linear' or 'logarithmic'")
@@ -129,6 +152,7 @@ class Random(Excitation):
     band: tuple[float, float] | None = None
 
     def loads(self, rig: Rig, sampling: Sampling, rng: np.random.Generator) -> list[Load]:
+        _require(self, from_zero=("rms",))
         noise = _Noise(len(rig.inputs), self.rms, self.band, sampling, _seed(rng))
         return [_load(self.kind, rig, sampling, lambda: ((block, None) for block in noise.blocks()))]
 
@@ -143,6 +167,9 @@ class BurstRandom(Excitation):
     burst: float = 0.5
 
     def loads(self, rig: Rig, sampling: Sampling, rng: np.random.Generator) -> list[Load]:
+        _require(self, from_zero=("rms", "burst"))
+        if self.burst > 1:
+            raise LabError(f"burst is {self.burst}; expected a share of the record, from 0 to 1")
         noise = _Noise(len(rig.inputs), self.rms, self.band, sampling, _seed(rng))
         last = round(self.burst * sampling.n_samples)
 
@@ -168,10 +195,12 @@ class Multisine(Excitation):
     period: float | None = None
 
     def loads(self, rig: Rig, sampling: Sampling, rng: np.random.Generator) -> list[Load]:
+        _require(self, above_zero=("period",), from_zero=("rms",))
         low, high = _band(self.band, sampling)
-        n = sampling.n_samples if self.period is None else round(self.period * sampling.sample_rate)
-        lines = np.arange(n // 2 + 1) * sampling.sample_rate / n
-        used = (lines >= low) & (lines <= high) & (lines > 0) & (lines < sampling.sample_rate / 2)
+        n = sampling.n_samples if self.period is None else self._period_samples(sampling)
+        number = np.arange(n // 2 + 1)
+        lines, near = number * sampling.sample_rate / n, 1e-9 * sampling.sample_rate / n
+        used = (lines > low - near) & (lines < high + near) & (number > 0) & (2 * number < n)
         if not used.any():
             raise LabError(
                 f"a period of {n} samples has no line between {low} and {high} Hz; lengthen it or widen the band"
@@ -187,6 +216,16 @@ class Multisine(Excitation):
 
         return [_load(self.kind, rig, sampling, blocks)]
 
+    def _period_samples(self, sampling: Sampling) -> int:
+        assert self.period is not None
+        n = round(self.period * sampling.sample_rate)
+        if abs(n - self.period * sampling.sample_rate) > 1e-6 * n:
+            raise LabError(
+                f"a period of {self.period} s is {self.period * sampling.sample_rate:.6g} samples; expected a whole number of "
+                f"samples, as {max(n, 1) / sampling.sample_rate:.9g} s is"
+            )
+        return n
+
 
 @dataclass(frozen=True)
 class Ambient(Excitation):
@@ -198,7 +237,12 @@ class Ambient(Excitation):
     dofs: tuple[str, ...] | None = None
 
     def loads(self, rig: Rig, sampling: Sampling, rng: np.random.Generator) -> list[Load]:
+        _require(self, from_zero=("rms",))
         rows = [_dof(rig, name) for name in (rig.dofs if self.dofs is None else self.dofs)]
+        if not rows or len(set(rows)) < len(rows):
+            raise LabError(
+                f"ambient dofs are {self.dofs}; expected at least one degree of freedom, each once"
+            )
         noise = _Noise(len(rows), self.rms, self.band, sampling, _seed(rng))
 
         def blocks() -> Blocks:
@@ -219,6 +263,9 @@ class FreeDecay(Excitation):
     velocity: Mapping[str, float] = field(default_factory=dict)
 
     def loads(self, rig: Rig, sampling: Sampling, rng: np.random.Generator) -> list[Load]:
+        for name, value in (*self.displacement.items(), *self.velocity.items()):
+            if not np.isfinite(value):
+                raise LabError(f"the release of {name!r} is {value}; expected a finite number")
         if not any(self.displacement.values()) and not any(self.velocity.values()):
             raise LabError(
                 "a free decay starts at rest; give a displacement or a velocity for a degree of freedom"
@@ -253,6 +300,9 @@ class _Noise:
     sampling: Sampling
     seed: int
 
+    def __post_init__(self) -> None:
+        _band(self.band or (0.0, 0.0), self.sampling)
+
     def blocks(self) -> Iterator[Array]:
         rng = np.random.default_rng(self.seed)
         sections, scale = self._filter()
@@ -274,15 +324,56 @@ class _Noise:
         nyquist = self.sampling.sample_rate / 2
         if low <= 0 and high >= nyquist:
             return None, 1.0
-        if low <= 0:
-            sections = scipy.signal.butter(6, high / nyquist, "lowpass", output="sos")
-        elif high >= nyquist:
-            sections = scipy.signal.butter(6, low / nyquist, "highpass", output="sos")
-        else:
-            sections = scipy.signal.butter(6, (low / nyquist, high / nyquist), "bandpass", output="sos")
+        edges = [edge / nyquist for edge in (low, high) if 0 < edge < nyquist]
+        kind = "bandpass" if len(edges) == 2 else "lowpass" if low <= 0 else "highpass"
+        sections = scipy.signal.butter(
+            FILTER_ORDER, edges if len(edges) == 2 else edges[0], kind, output="sos"
+        )
         # White noise of unit variance leaves with the energy of the impulse response, by Parseval's theorem.
-        _, H = scipy.signal.freqz_sos(sections, worN=1 << 16)
-        return sections, float(1 / np.sqrt(np.mean(np.abs(H) ** 2)))
+        return sections, 1 / math.sqrt(_energy(edges, kind))
+
+
+def _energy(edges: Sequence[float], kind: str) -> float:
+    """Mean power gain of the digital Butterworth filter over all frequencies, as shares of half the sample rate."""
+    corners = [math.tan(math.pi * edge / 2) for edge in edges]
+
+    def gain(share: float) -> float:
+        w = math.tan(math.pi * share / 2)
+        if kind == "bandpass":
+            x = (w * w - corners[0] * corners[1]) / ((corners[1] - corners[0]) * w)
+        else:
+            x = w / corners[0] if kind == "lowpass" else corners[0] / w
+        return 1 / (1 + x ** (2 * FILTER_ORDER))
+
+    # Closer and closer to the edges, so that no narrow band is overlooked.
+    width = edges[1] - edges[0] if kind == "bandpass" else min(edges[0], 1 - edges[0])
+    near = [edge + side * width * 4.0**k for edge in edges for side in (-1, 0, 1) for k in range(-1, 20)]
+    points = [0.0, *sorted({point for point in near if 0 < point < 1}), 1.0]
+    return sum(
+        scipy.integrate.quad(gain, a, b, epsabs=0, epsrel=1e-10)[0] for a, b in itertools.pairwise(points)
+    )
+
+
+def _require(
+    excitation: Excitation, *, above_zero: Sequence[str] = (), from_zero: Sequence[str] = ()
+) -> None:
+    """Checks that all numbers among the settings are finite, and on the right side of zero."""
+    for each in fields(excitation):
+        value = getattr(excitation, each.name)
+        if isinstance(value, bool) or not isinstance(value, int | float):
+            continue
+        good = np.isfinite(value) and not (each.name in above_zero and value <= 0)
+        if not good or (each.name in from_zero and value < 0):
+            raise LabError(
+                f"{each.name} of a test of kind {excitation.kind!r} is {value}; expected a finite number"
+                + (
+                    " above zero"
+                    if each.name in above_zero
+                    else " from zero"
+                    if each.name in from_zero
+                    else ""
+                )
+            )
 
 
 def _load(
