@@ -8,7 +8,8 @@ A chain is a list of stages in each of four places, in the order in which the si
 Stages of `actuators` see forces at every substep of the simulation, shape (3, n): at its start, on average (which is what
 acts), and at its end. Stages of `sensors` see the signal at every instant between substeps, shape (3, n): as the substep
 before it ends, as the substep after it starts, both under the mean force of that substep, and at the instant itself.
-Stages of `force_sensors` and `acquisition` see samples, shape (n,). The default chain is ideal: it has no stage, and the recorded input is the commanded force.
+Stages of `force_sensors` and `acquisition` see samples, shape (n,). The default chain is ideal: it has no stage, and the
+recorded input is the commanded force.
 """
 
 from __future__ import annotations
@@ -18,6 +19,7 @@ import json
 import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, fields
+from numbers import Real
 from typing import Any, ClassVar
 
 import numpy as np
@@ -39,10 +41,33 @@ class Stage:
 
     Attributes:
         channel: name of the channel it happens to, or "*" for every channel.
+
+    Raises:
+        RigError: a setting is no number, or out of its bounds.
     """
 
     name: ClassVar[str] = ""
+    at_samples: ClassVar[bool] = False
+    positive: ClassVar[tuple[str, ...]] = ()
+    not_negative: ClassVar[tuple[str, ...]] = ()
     channel: str
+
+    def __post_init__(self) -> None:
+        for setting in fields(self)[1:]:
+            value = getattr(self, setting.name)
+            if isinstance(value, bool) or not isinstance(value, Real) or not math.isfinite(value):
+                bound, good = "a finite number", False
+            elif setting.name in self.positive:
+                bound, good = "a positive number", float(value) > 0
+            else:
+                bound, good = (
+                    "a number of at least 0",
+                    setting.name not in self.not_negative or float(value) >= 0,
+                )
+            if not good:
+                raise RigError(
+                    f"{setting.name} of stage {self.name!r} on {self.channel!r} is {value!r}; expected {bound}"
+                )
 
     def start(self, dt: float, rng: np.random.Generator, rms: float) -> Process:
         """A process for one channel of one record.
@@ -64,14 +89,13 @@ class Stage:
         return False
 
     @property
-    def relative_noise(self) -> float:
-        """Random error as a share of the signal's RMS; infinite for a stage that adds none."""
-        return float("inf")
+    def needs_samples(self) -> bool:
+        """Whether the stage makes sense for samples only."""
+        return False
 
-    @property
-    def absolute_noise(self) -> float:
-        """Random error per sample at 1 Hz bandwidth or in the channel's unit; infinite for a stage that adds none."""
-        return float("inf")
+    def noise(self, dt: float, rms: float) -> float:
+        """Standard deviation of the random error of one value, for a signal of that root mean square."""
+        return 0.0
 
 
 @dataclass(frozen=True)
@@ -90,6 +114,7 @@ class Saturation(Stage):
     """Clips the signal at ±`limit` [unit of the channel]."""
 
     name: ClassVar[str] = "saturation"
+    positive: ClassVar[tuple[str, ...]] = ("limit",)
     limit: float
 
     def start(self, dt: float, rng: np.random.Generator, rms: float) -> Process:
@@ -101,6 +126,7 @@ class Lag(Stage):
     """First-order low-pass of corner frequency `corner_hz`; a lag of time constant 1 / (2π corner_hz)."""
 
     name: ClassVar[str] = "lag"
+    positive: ClassVar[tuple[str, ...]] = ("corner_hz",)
     corner_hz: float
 
     @property
@@ -115,10 +141,31 @@ class Lag(Stage):
 
 
 @dataclass(frozen=True)
+class HeldLag(Stage):
+    """First-order lag of an actuator whose lagging force is held over each sample, as a digital controller gives it."""
+
+    name: ClassVar[str] = "held_lag"
+    at_samples: ClassVar[bool] = True
+    time_constant: float
+
+    def start(self, dt: float, rng: np.random.Generator, rms: float) -> Process:
+        share = -np.expm1(-dt / self.time_constant)
+        memory = np.zeros(1)
+
+        def process(x: Array) -> Array:
+            nonlocal memory
+            y, memory = scipy.signal.lfilter([share], [1, share - 1], x, zi=memory)
+            return np.asarray(y)
+
+        return process
+
+
+@dataclass(frozen=True)
 class LowPass(Stage):
     """Butterworth low-pass of `order` with corner frequency `corner_hz`, as in an anti-alias filter."""
 
     name: ClassVar[str] = "low_pass"
+    positive: ClassVar[tuple[str, ...]] = ("corner_hz", "order")
     corner_hz: float
     order: int = 2
 
@@ -138,6 +185,7 @@ class Delay(Stage):
     """Gives the signal `delay` seconds later; before the record it stood still."""
 
     name: ClassVar[str] = "delay"
+    not_negative: ClassVar[tuple[str, ...]] = ("delay",)
     delay: float
 
     @property
@@ -184,6 +232,7 @@ class Hum(Stage):
     """Adds a sine of `frequency_hz` and `amplitude` [unit of the channel]; `phase` [rad] at the start of the record."""
 
     name: ClassVar[str] = "hum"
+    not_negative: ClassVar[tuple[str, ...]] = ("frequency_hz",)
     frequency_hz: float
     amplitude: float
     phase: float = 0.0
@@ -199,6 +248,17 @@ class Hum(Stage):
 
         return process
 
+    def start_held(self, dt: float) -> Process:
+        rng, turn = np.random.default_rng(0), 2 * np.pi * self.frequency_hz * dt
+        # The mean over a substep is the value at its middle, a little less.
+        middle = dataclasses.replace(self, amplitude=self.amplitude * float(np.sinc(turn / (2 * np.pi))))
+        sines = [
+            dataclasses.replace(hum, phase=self.phase + part * turn)
+            for hum, part in ((self, 0), (middle, 0.5), (self, 1))
+        ]
+        rows = [sine.start(dt, rng, 0.0) for sine in sines]
+        return lambda x: np.stack([process(row) for process, row in zip(rows, x, strict=True)])
+
 
 @dataclass(frozen=True)
 class Noise(Stage):
@@ -211,21 +271,20 @@ class Noise(Stage):
     """
 
     name: ClassVar[str] = "noise"
+    not_negative: ClassVar[tuple[str, ...]] = ("percent", "std", "density")
     percent: float = 0.0
     std: float = 0.0
     density: float = 0.0
 
     @property
-    def relative_noise(self) -> float:
-        return self.percent / 100 if self.percent else float("inf")
+    def needs_samples(self) -> bool:
+        return True
 
-    @property
-    def absolute_noise(self) -> float:
-        return float(np.hypot(self.std, self.density)) or float("inf")
+    def noise(self, dt: float, rms: float) -> float:
+        return math.sqrt((self.percent / 100 * rms) ** 2 + self.std**2 + self.density**2 / (2 * dt))
 
     def start(self, dt: float, rng: np.random.Generator, rms: float) -> Process:
-        variance = (self.percent / 100 * rms) ** 2 + self.std**2 + self.density**2 / (2 * dt)
-        sigma = np.sqrt(variance)
+        sigma = self.noise(dt, rms)
         return lambda x: x + sigma * rng.standard_normal(x.shape)
 
 
@@ -234,11 +293,11 @@ class Resolution(Stage):
     """Rounds to whole multiples of `step` [unit of the channel], as a converter of finite bits does."""
 
     name: ClassVar[str] = "resolution"
+    positive: ClassVar[tuple[str, ...]] = ("step",)
     step: float
 
-    @property
-    def absolute_noise(self) -> float:
-        return self.step / np.sqrt(12)
+    def noise(self, dt: float, rms: float) -> float:
+        return self.step / math.sqrt(12)
 
     def start(self, dt: float, rng: np.random.Generator, rms: float) -> Process:
         return lambda x: np.round(x / self.step) * self.step
@@ -249,16 +308,29 @@ class Dropout(Stage):
     """Loses single samples with the given probability; a lost sample is NaN."""
 
     name: ClassVar[str] = "dropout"
+    not_negative: ClassVar[tuple[str, ...]] = ("probability",)
     probability: float
+
+    @property
+    def needs_samples(self) -> bool:
+        return True
 
     def start(self, dt: float, rng: np.random.Generator, rms: float) -> Process:
         return lambda x: np.where(rng.random(x.shape) < self.probability, np.nan, x)
 
 
 STAGES: dict[str, type[Stage]] = {
-    stage.name: stage for stage in (Gain, Saturation, Lag, LowPass, Delay, Hum, Noise, Resolution, Dropout)
+    stage.name: stage
+    for stage in (Gain, Saturation, Lag, HeldLag, LowPass, Delay, Hum, Noise, Resolution, Dropout)
 }
-PLACES = ("actuators", "sensors", "force_sensors", "acquisition")
+PLACES = {
+    "actuators": "input channel",
+    "disturbances": "degree of freedom",
+    "sensors": "output channel",
+    "force_sensors": "input channel",
+    "acquisition": "output channel",
+}
+"""Where stages sit, and what the name of a stage stands for there."""
 
 
 @dataclass(frozen=True, repr=False)
@@ -270,6 +342,7 @@ class Chain:
         outputs: names of the connected output channels; None for all.
         swaps: pairs of output channels whose cables are exchanged.
         actuators: stages from commanded to applied force.
+        disturbances: what adds to the unmeasured force on a degree of freedom, named as channel.
         sensors: stages from motion to signal.
         force_sensors: stages on the measured force.
         force_measured: the recorded input is the force that acted, as force sensors saw it, not the commanded one.
@@ -280,6 +353,7 @@ class Chain:
     outputs: tuple[str, ...] | None = None
     swaps: tuple[tuple[str, str], ...] = ()
     actuators: tuple[Stage, ...] = ()
+    disturbances: tuple[Stage, ...] = ()
     sensors: tuple[Stage, ...] = ()
     force_sensors: tuple[Stage, ...] = ()
     force_measured: bool = False
@@ -290,29 +364,42 @@ class Chain:
         changed: dict[str, Any] = {place: (*getattr(self, place), *stages)}
         return dataclasses.replace(self, **changed)
 
-    def check(self, inputs: Sequence[str], outputs: Sequence[str]) -> None:
-        """Check every channel name against those that exist.
+    def check(self, inputs: Sequence[str], outputs: Sequence[str], dofs: Sequence[str]) -> None:
+        """Check every name of a channel or degree of freedom against those that exist.
 
         Raises:
             UnknownNameError: a name does not exist.
+            RigError: a stage sits where it cannot act, or only one of two swapped channels is connected.
         """
-        wanted = [("input", name, inputs) for name in self.inputs or ()]
-        wanted += [("output", name, outputs) for name in (self.outputs or ())]
-        wanted += [("output", name, outputs) for pair in self.swaps for name in pair]
-        for place, side, names in zip(
-            PLACES, ("input", "output", "input", "output"), (inputs, outputs) * 2, strict=True
-        ):
-            wanted += [(side, stage.channel, names) for stage in getattr(self, place) if stage.channel != ALL]
-        for place in ("force_sensors", "acquisition"):
+        wanted = [("input channel", name, inputs) for name in self.inputs or ()]
+        wanted += [("output channel", name, outputs) for name in (self.outputs or ())]
+        wanted += [("output channel", name, outputs) for pair in self.swaps for name in pair]
+        exist = {"input channel": inputs, "output channel": outputs, "degree of freedom": dofs}
+        for place, side in PLACES.items():
+            used = [stage.channel for stage in getattr(self, place) if stage.channel != ALL]
+            wanted += [(side, name, exist[side]) for name in used]
+        for place in PLACES:
+            between = place in ("actuators", "sensors")
             for stage in getattr(self, place):
-                if stage.needs_substeps:
+                if stage.needs_substeps and not between:
                     raise RigError(
-                        f"stage {stage.name!r} cannot act on samples in {place!r}; put it among the sensors"
+                        f"stage {stage.name!r} cannot act on samples in {place!r}; put it among the actuators or sensors"
+                    )
+                if stage.needs_samples and between:
+                    raise RigError(
+                        f"stage {stage.name!r} acts on samples only, not in {place!r}; put it in 'acquisition' or "
+                        "'force_sensors'"
                     )
         for side, name, names in wanted:
             if name not in names:
                 raise UnknownNameError(
-                    f"{side} channel {name!r} does not exist in the model; there are {', '.join(names) or 'none'}"
+                    f"{side} {name!r} does not exist in the model; there are {', '.join(names) or 'none'}"
+                )
+        for pair in self.swaps:
+            unplugged = [name for name in pair if self.outputs is not None and name not in self.outputs]
+            if unplugged:
+                raise RigError(
+                    f"outputs {pair[0]!r} and {pair[1]!r} are swapped, but {unplugged[0]!r} is not connected; connect both"
                 )
 
     def for_channel(self, place: str, channel: str) -> tuple[Stage, ...]:
@@ -327,10 +414,11 @@ class Chain:
     def to_data(self) -> dict[str, Any]:
         """Plain data for JSON."""
         data: dict[str, Any] = {"inputs": self.inputs, "outputs": self.outputs, "swaps": self.swaps}
-        data["force_measured"] = self.force_measured or None
+        data["force_measured"] = self.force_measured
         for place in PLACES:
             data[place] = [{"stage": s.name, **dataclasses.asdict(s)} for s in getattr(self, place)]
-        return {key: value for key, value in data.items() if value not in (None, [], ())}
+        ideal = Chain()
+        return {key: value for key, value in data.items() if getattr(self, key) != getattr(ideal, key)}
 
     @classmethod
     def from_data(cls, data: Mapping[str, Any]) -> Chain:
@@ -339,6 +427,8 @@ class Chain:
         Raises:
             RigError: a key or stage is unknown.
         """
+        if not isinstance(data, Mapping):
+            raise RigError(f"the measurement chain is {data!r}; expected a table")
         allowed = [f.name for f in fields(cls)]
         for key in data:
             if key not in allowed:

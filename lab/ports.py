@@ -76,7 +76,8 @@ def find(model: mujoco.MjModel, position: Array) -> Ports:
         RigError: two channels share a name.
     """
     names = [name_of(model, "joint", i) for i in range(model.njnt)]
-    inputs = [_input(model, i, column, names) for i, column in enumerate(_force_columns(model, position).T)]
+    columns = _force_columns(model, position).T
+    inputs = [_input(model, i, columns[i], names) for i in range(model.nu) if not is_law(model)[i]]
     jacobians = _sensor_jacobians(model, position)
     outputs, rows = [], []
     for i in range(model.nsensor):
@@ -98,6 +99,12 @@ def find(model: mujoco.MjModel, position: Array) -> Ports:
             double = next(n for n in listed if listed.count(n) > 1)
             raise RigError(f"two {side} are called {double!r}; expected unique names")
     return Ports(tuple(inputs), tuple(outputs), rows)
+
+
+def is_law(model: mujoco.MjModel) -> np.ndarray:
+    """Which actuators are force laws of the lab (`lab.laws`) rather than inputs, shape (n_actuators,)."""
+    dynamics, bias = int(mujoco.mjtDyn.mjDYN_USER), int(mujoco.mjtBias.mjBIAS_USER)
+    return np.asarray((model.actuator_dyntype == dynamics) | (model.actuator_biastype == bias))
 
 
 def name_of(model: mujoco.MjModel, kind: str, index: int) -> str:
@@ -170,7 +177,8 @@ def _force_columns(model: mujoco.MjModel, position: Array) -> Array:
     mujoco.mju_sparse2dense(
         moment, data.actuator_moment, data.moment_rownnz, data.moment_rowadr, data.moment_colind
     )
-    gains = np.array([_gain(model, i, data) for i in range(model.nu)])
+    laws = is_law(model)
+    gains = np.array([0.0 if laws[i] else _gain(model, i, data) for i in range(model.nu)])
     return (moment * gains[:, None]).T if model.nu else np.zeros((model.nv, 0))
 
 

@@ -9,6 +9,7 @@ from __future__ import annotations
 import json
 import xml.etree.ElementTree as ET
 from collections.abc import Callable, Sequence
+from contextlib import suppress
 from dataclasses import dataclass, replace
 from functools import cached_property
 from pathlib import Path
@@ -54,7 +55,7 @@ class Rig:
         folder: where relative files of the MJCF lie; None when it names none.
 
     Raises:
-        RigError: MuJoCo refuses the MJCF, or it has joints other than slides and hinges.
+        RigError: MuJoCo refuses the MJCF, or it has joints other than slides and hinges, delays or plastic springs.
         UnknownNameError: the chain names a channel that does not exist.
     """
 
@@ -75,7 +76,18 @@ class Rig:
                     f"joint {ports.name_of(model, 'joint', index)!r} of model {self.name!r} is a free or ball joint; expected "
                     "slide and hinge joints (three slides and three hinges move a body freely)"
                 )
-        self.chain.check([c.name for c in self._ports.inputs], [c.name for c in self._ports.outputs])
+        if model.nhistory:
+            raise RigError(
+                f"model {self.name!r} delays an actuator or sensor by itself (nsample), which substeps would distort; remove "
+                "it and put a delay into the measurement chain"
+            )
+        if np.any(model.jnt_springyield) or np.any(model.tendon_springyield):
+            raise RigError(
+                f"model {self.name!r} has a plastic spring (springyield), which Runge-Kutta steps cannot follow; remove it and "
+                "add the effect 'hysteresis'"
+            )
+        inputs, outputs = ([c.name for c in side] for side in (self._ports.inputs, self._ports.outputs))
+        self.chain.check(inputs, outputs, self.dofs)
 
     @classmethod
     def load(cls, path: str | Path) -> Rig:
@@ -102,11 +114,16 @@ class Rig:
         """
         root = mjcf.parse(self.xml)
         _write_chain(root, self.chain)
-        if self.folder is not None and Path(path).resolve().parent != self.folder:
-            _anchor_files(root, self.folder)
+        path = Path(path)
+        if self.folder is not None and path.resolve().parent != self.folder:
+            mjcf.anchor(root, self.folder)
+        part = path.with_name(f".{path.name}.part")
         try:
-            Path(path).write_text(mjcf.to_text(root), encoding="utf-8")
+            part.write_text(mjcf.to_text(root), encoding="utf-8")
+            part.replace(path)
         except OSError as error:
+            with suppress(OSError):
+                part.unlink()
             raise FileError(f"cannot write {path} ({error.strerror}); expected a writable folder") from None
 
     def edited(self, edit: Callable[[ET.Element], None]) -> Rig:
@@ -251,8 +268,13 @@ class Rig:
     def _everything(self) -> StateSpace:
         A, B, C, D = self._linearized
         forces = tuple(Channel(f"force on {dof}", "N", dof) for dof in self.dofs)
-        rows = self._ports.rows
-        return StateSpace(A, B, C[rows], D[rows], 0.0, self._ports.inputs + forces, self._ports.outputs)
+        rows, visible = self._ports.rows, len(self._ports.inputs)
+        # Force laws are actuators without a port: they stand behind all others.
+        columns = [*range(visible), *range(self.model.nu, B.shape[1])]
+        inputs = self._ports.inputs + forces
+        return StateSpace(
+            A, B[:, columns], C[rows], D[np.ix_(rows, columns)], 0.0, inputs, self._ports.outputs
+        )
 
     def row_of(self, output: str) -> int:
         """Position of an output channel in MuJoCo's `sensordata`."""
@@ -343,16 +365,3 @@ def _write_chain(root: ET.Element, chain: Chain) -> None:
         place = root.find("custom")
         place = ET.SubElement(root, "custom") if place is None else place
         ET.SubElement(place, "text", name=CHAIN_TEXT, data=json.dumps(chain.to_data()))
-
-
-def _anchor_files(root: ET.Element, folder: Path) -> None:
-    """Makes relative asset folders absolute, so that the file can be loaded from elsewhere."""
-    if not root.findall(".//*[@file]"):
-        return
-    compiler = root.find("compiler")
-    if compiler is None:
-        compiler = ET.Element("compiler")
-        root.insert(0, compiler)
-    shared = compiler.attrib.pop("assetdir", "")
-    for key in ("meshdir", "texturedir"):
-        compiler.set(key, str(folder / compiler.get(key, shared)))

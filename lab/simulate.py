@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
+import math
 import tempfile
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 
@@ -18,8 +19,8 @@ from lab.files.recording import RecordingWriter, load
 from lab.rig import Rig
 from lab.stepping import Plan, Stepper
 
-PILOT_SAMPLES = 512
-"""Length of the trial runs on which the error is measured."""
+PILOT_SAMPLES, MOST_PILOT_SAMPLES = 512, 4096
+"""Length of the trial runs on which the error is measured, and at most for lightly damped structures."""
 
 FINEST, FINEST_UNASKED = 4096, 256
 """Most substeps per sample, for an accuracy that was asked for and for the default one."""
@@ -28,7 +29,7 @@ IDEAL_ACCURACY = 1e-9
 NOISE_SHARE = 1e-3
 """Default error: this share of the smallest noise in the chain, or `IDEAL_ACCURACY` when the chain adds none."""
 
-DRIVE, NOISE = 0, 1
+DRIVE, NOISE, DISTURBANCE = 0, 1, 2
 """Separate streams of randomness: what drives the structure, and what disturbs the signals."""
 
 Progress = Callable[[int], None]
@@ -84,9 +85,7 @@ def simulate(
     records = []
     for number, (load_, blocks) in enumerate(bench.responses(progress)):
         parts = list(blocks)
-        inputs = np.concatenate([part[0] for part in parts], axis=1)
-        outputs = np.concatenate([part[1] for part in parts], axis=1)
-        digitize = bench.digitizer(number, _rms(inputs), _rms(outputs))
+        digitize = bench.digitizer(number, _rms(part[0] for part in parts), _rms(part[1] for part in parts))
         digitized = [digitize(a, b) for a, b in parts]
         measured = [part[0] for part in digitized] if load_.measured else [np.zeros((0, load_.n_samples))]
         outputs = np.concatenate([part[1] for part in digitized], axis=1)
@@ -119,15 +118,15 @@ def simulate_to_file(
         for number, (load_, blocks) in enumerate(bench.responses(progress, one_by_one=True)):
             # Noise relative to a record's RMS is known only at the record's end: keep the clean record until then.
             clean = Path(folder) / "clean.h5"
-            sums, n = [np.zeros(len(rig.inputs)), np.zeros(len(rig.outputs))], load_.n_samples
             with RecordingWriter(clean, *about) as writer:
                 writer.start(load_.kind)
                 for inputs, outputs in blocks:
                     writer.append(inputs, outputs)
-                    sums = [s + np.sum(x**2, axis=1) for s, x in zip(sums, (inputs, outputs), strict=True)]
-            digitize = bench.digitizer(number, *(np.sqrt(s / n) for s in sums))
+            record = load(clean, lazy=True).records[0]
+            rms = (_rms(block[side] for block in record.blocks(BLOCK)) for side in (0, 1))
+            digitize = bench.digitizer(number, *rms)
             final.start(load_.kind)
-            for inputs, outputs in load(clean, lazy=True).records[0].blocks(BLOCK):
+            for inputs, outputs in record.blocks(BLOCK):
                 inputs, outputs = digitize(inputs, outputs)
                 final.append(inputs if load_.measured else np.zeros((0, outputs.shape[1])), outputs)
 
@@ -187,9 +186,12 @@ class _Bench:
         seed: int,
         accuracy: float | None,
     ) -> _Bench:
-        for name, value in (("sample_rate", sample_rate), ("duration", duration), ("n_runs", n_runs)):
+        for name, value in (("sample_rate", sample_rate), ("duration", duration)):
             if not (np.isfinite(value) and value > 0):
                 raise LabError(f"{name} is {value}; expected a positive number")
+        for name, count, least in (("n_runs", n_runs, 1), ("seed", seed, 0)):
+            if not (isinstance(count, int | np.integer) and count >= least):
+                raise LabError(f"{name} is {count}; expected a whole number of at least {least}")
         if accuracy is not None and not 1e-13 <= accuracy < 1:
             raise LabError(f"accuracy is {accuracy}; expected a relative error from 1e-13 to below 1")
         n_samples = round(duration * sample_rate)
@@ -199,7 +201,8 @@ class _Bench:
             )
         rng = np.random.default_rng([seed, DRIVE])
         sampling = Sampling(sample_rate, n_samples)
-        loads = tuple(load for _ in range(n_runs) for load in excitation.loads(rig, sampling, rng))
+        every = [load for _ in range(n_runs) for load in excitation.loads(rig, sampling, rng)]
+        loads = tuple(replace(load, number=number) for number, load in enumerate(every))
         bench = cls(rig, loads, sample_rate, Plan(1, False), 0.0, seed)
         return bench._planned(accuracy)
 
@@ -215,7 +218,7 @@ class _Bench:
     def _planned(self, asked: float | None) -> _Bench:
         """The bench with substeps that reach the accuracy, as measured on the start of its first records."""
         dt, chain = 1 / self.sample_rate, self.rig.chain
-        pilots = [replace(load, n_samples=min(load.n_samples, PILOT_SAMPLES)) for load in self.loads[:4]]
+        pilots, growth = self._pilots()
         delays = [s.delay for s in (*chain.actuators, *chain.sensors) if isinstance(s, Delay)]
 
         def guess(accuracy: float) -> Plan:
@@ -225,22 +228,34 @@ class _Bench:
         if asked is None and chain.acquisition:
             outputs = [part.outputs for part in self._with(guess(1e-4)).batch(pilots, None)]
             accuracy = self._default_accuracy(np.concatenate(outputs, axis=2))
-        plan, finest = guess(accuracy), FINEST if asked is not None else FINEST_UNASKED
-        while True:
-            plan = replace(plan, error=self._error(plan, pilots))
-            if plan.error <= accuracy:
-                break
-            if plan.substeps >= finest and asked is None:
-                # Kinks in forces and lags of instruments cap the order: keep the best, its error is on record.
-                break
-            if plan.substeps >= finest:
-                raise LabError(
-                    f"an accuracy of {accuracy:.1e} is out of reach: the error is {plan.error:.1e} with {plan.substeps} "
-                    "substeps per sample; ask for less, or sample faster"
-                )
+        finest = FINEST if asked is not None else FINEST_UNASKED
+        best = plan = self._measured(guess(accuracy), pilots, growth)
+        in_vain = 0
+        # Rounding puts a floor under the error: two finer plans that are no better have met it.
+        while best.error > accuracy and plan.substeps < finest and in_vain < 2:
             wanted = stepping.finer(self.rig, plan, accuracy)
-            plan = stepping.aligned(replace(wanted, substeps=min(wanted.substeps, finest)), dt, delays)
-        return replace(self._with(plan), accuracy=accuracy)
+            wanted = stepping.aligned(replace(wanted, substeps=min(wanted.substeps, finest)), dt, delays)
+            plan = self._measured(wanted, pilots, growth)
+            in_vain = 0 if plan.error < best.error else in_vain + 1
+            best = min(best, plan, key=lambda each: each.error)
+        if best.error > accuracy and asked is not None:
+            raise LabError(
+                f"an accuracy of {accuracy:.1e} is out of reach: the error is {best.error:.1e} with {best.substeps} substeps "
+                "per sample; ask for less, or sample faster"
+            )
+        # For the default accuracy, where kinks and lags cap the order, the best will do; its error is on record.
+        return replace(self._with(best), accuracy=accuracy)
+
+    def _pilots(self) -> tuple[list[Load], float]:
+        """The start of the first records, and the factor by which the error can still grow after it."""
+        settled = 2 * stepping.settling_time(self.rig) * self.sample_rate
+        n = int(np.clip(settled, PILOT_SAMPLES, MOST_PILOT_SAMPLES))
+        whole = self.loads[0].n_samples
+        starts = [replace(load, n_samples=min(n, whole), whole=whole) for load in self.loads[:4]]
+        return starts, max(1.0, min(settled, whole) / n)
+
+    def _measured(self, plan: Plan, pilots: Sequence[Load], growth: float) -> Plan:
+        return replace(plan, error=growth * self._error(plan, pilots))
 
     def _with(self, plan: Plan) -> _Bench:
         return replace(self, plan=plan)
@@ -260,16 +275,16 @@ class _Bench:
         return float(np.max(difference / np.where(largest > 0, largest, 1.0)))
 
     def _default_accuracy(self, outputs: Array) -> float:
-        largest, rms = np.max(np.abs(outputs), axis=(0, 2)), _rms(np.concatenate(list(outputs), axis=1))
-        smallest = float("inf")
+        """`NOISE_SHARE` of the smallest noise of an output channel, relative to the largest value of the channel."""
+        order = _swapped(self.rig)
+        largest, rms = np.max(np.abs(outputs), axis=(0, 2))[order], _rms([np.hstack(list(outputs))[order]])
+        shares = []
         for row, channel in enumerate(self.rig.outputs):
-            for stage in self.rig.chain.for_channel("acquisition", channel.name):
-                if largest[row] > 0:
-                    noise = min(stage.relative_noise * rms[row], stage.absolute_noise)
-                    smallest = min(smallest, noise / largest[row])
-        if not np.isfinite(smallest):
-            return IDEAL_ACCURACY
-        return float(np.clip(NOISE_SHARE * smallest, 1e-12, 1e-4))
+            stages = self.rig.chain.for_channel("acquisition", channel.name)
+            noise = math.hypot(*(stage.noise(1 / self.sample_rate, rms[row]) for stage in stages))
+            if noise > 0 and largest[row] > 0:
+                shares.append(noise / largest[row])
+        return float(np.clip(NOISE_SHARE * min(shares), 1e-12, 1e-4)) if shares else IDEAL_ACCURACY
 
     def responses(
         self, progress: Progress | None, *, one_by_one: bool = False
@@ -287,7 +302,12 @@ class _Bench:
         """Records of equal length side by side, in stretches of at most `BLOCK` samples."""
         start = (np.stack([load.position for load in loads]), np.stack([load.velocity for load in loads]))
         dt = 1 / self.sample_rate
-        runs = [_Run(self.rig, Stepper(self.rig, dt, substeps, *start), dt) for substeps in self.plan.runs]
+        duration = max(load.n_record for load in loads) * dt
+        disturb = [self._disturbances(load) for load in loads]
+        runs = [
+            _Run(self.rig, Stepper(self.rig, dt, substeps, *start, duration), dt)
+            for substeps in self.plan.runs
+        ]
         sensors = None if self.rig.chain.needs_substeps else [_sensors(self.rig, dt) for _ in loads]
         blocks = [load.blocks() for load in loads]
         done = 0
@@ -296,6 +316,9 @@ class _Bench:
             n = min(items[0][0].shape[1], loads[0].n_samples - done)
             commands = np.stack([item[0][:, :n] for item in items])
             forces = None if items[0][1] is None else np.stack([item[1][:, :n] for item in items])  # type: ignore[index]
+            if self.rig.chain.disturbances:
+                pushes = np.stack([_through(rows, np.zeros((len(rows), n))) for rows in disturb])
+                forces = pushes if forces is None else forces + pushes
             parts = [run.respond(commands, forces) for run in runs]
             part = replace(
                 parts[0],
@@ -312,6 +335,19 @@ class _Bench:
             if progress is not None:
                 progress(n * len(loads))
 
+    def _disturbances(self, load: Load) -> list[list[Process]]:
+        """Fresh stages of the unmeasured force on every degree of freedom during one load."""
+        dt, chain = 1 / self.sample_rate, self.rig.chain
+        found = []
+        for row, dof in enumerate(self.rig.dofs):
+            stages = chain.for_channel("disturbances", dof)
+            rngs = [
+                np.random.default_rng([self.seed, DISTURBANCE, load.number, row, i])
+                for i in range(len(stages))
+            ]
+            found.append([stage.start(dt, rng, 0.0) for stage, rng in zip(stages, rngs, strict=True)])
+        return found
+
     def digitizer(
         self, number: int, rms_inputs: Array, rms_outputs: Array
     ) -> Callable[[Array, Array], tuple[Array, Array]]:
@@ -326,10 +362,11 @@ class _Bench:
         processes = []
         for side, (place, channels, rms) in enumerate(sides):
             rows = []
-            for row, (channel, size) in enumerate(zip(channels, rms, strict=True)):
+            for channel, size in zip(channels, rms, strict=True):
                 stages = chain.for_channel(place, channel.name)
+                # By name, so that a channel's noise does not depend on which others are connected.
                 rngs = [
-                    np.random.default_rng([self.seed, NOISE, number, side, row, i])
+                    np.random.default_rng([self.seed, NOISE, number, side, i, *channel.name.encode()])
                     for i in range(len(stages))
                 ]
                 rows.append([s.start(dt, rng, float(size)) for s, rng in zip(stages, rngs, strict=True)])
@@ -350,9 +387,13 @@ class _Run:
         chain, batch = rig.chain, range(stepper.n_batch)
         self.controls = [rig.control_of(channel.name) for channel in rig.inputs]
         self.rows = [rig.row_of(channel.name) for channel in rig.outputs]
+        stages = [chain.for_channel("actuators", channel.name) for channel in rig.inputs]
+        rng = np.random.default_rng(0)
+        self.sampled = [
+            [[s.start(dt, rng, 0.0) for s in row if s.at_samples] for row in stages] for _ in batch
+        ]
         self.actuators = [
-            [[s.start_held(h) for s in chain.for_channel("actuators", c.name)] for c in rig.inputs]
-            for _ in batch
+            [[s.start_held(h) for s in row if not s.at_samples] for row in stages] for _ in batch
         ]
         self.sensors = [_sensors(rig, h) for _ in batch] if chain.needs_substeps else None
         self.last_forces: Array | None = None
@@ -372,9 +413,9 @@ class _Run:
 
     def _chunk(self, commands: Array, forces: Array | None) -> _Part:
         sub = self.stepper.substeps
-        held = np.repeat(
-            np.repeat(commands, sub, axis=2)[:, :, None], 3, axis=2
-        )  # (n_batch, n_inputs, 3, n_substeps)
+        sampled = np.stack([_through(rows, x) for rows, x in zip(self.sampled, commands, strict=True)])
+        # (n_batch, n_inputs, 3, n_substeps)
+        held = np.repeat(np.repeat(sampled, sub, axis=2)[:, :, None], 3, axis=2)
         acting = np.stack([_through(rows, x) for rows, x in zip(self.actuators, held, strict=True)])
         controls = np.zeros((acting.shape[0], self.rig.model.nu, *acting.shape[2:]))
         controls[:, self.controls] = acting
@@ -385,7 +426,7 @@ class _Run:
         if self.sensors is not None:
             pairs = self._both_sides(readings, controls, pushes)
             readings = np.stack(
-                [_through(rows, y)[:, 1] for rows, y in zip(self.sensors, pairs, strict=True)]
+                [_through(rows, y)[:, 2] for rows, y in zip(self.sensors, pairs, strict=True)]
             )
         measured = commands
         if self.rig.chain.force_measured:
@@ -406,11 +447,15 @@ class _Run:
         last = np.zeros((*mean.shape[:2], 1)) if self.last_forces is None else self.last_forces
         previous = np.concatenate([last, mean[..., :-1]], axis=2)
         self.last_forces = mean[..., -1:]
-        D = self.rig.feedthrough[self.rows][:, : forces.shape[1]]
-        before, now = readings + D @ (previous - mean), readings + D @ (start - mean)
+        D = self.rig.feedthrough[self.rows]
+        before, now = readings.copy(), readings.copy()
+        # One force after the other: a matrix product would round differently for chunks of another length.
+        for j in np.flatnonzero(np.any(D[:, : forces.shape[1]] != 0, axis=0)):
+            before += D[:, j, None] * (previous - mean)[:, j, None]
+            now += D[:, j, None] * (start - mean)[:, j, None]
         if first:
             # Before a release the structure was held still where it starts.
-            before[:, [DERIVATIVE.get(c.quantity, 2) == 2 for c in self.rig.outputs], 0] = 0.0
+            before[:, [DERIVATIVE.get(c.quantity, 2) > 0 for c in self.rig.outputs], 0] = 0.0
         return np.stack([before, readings, now], axis=2)
 
 
@@ -443,5 +488,11 @@ def _swapped(rig: Rig) -> list[int]:
     return order
 
 
-def _rms(signals: Array) -> Array:
-    return np.sqrt(np.mean(signals**2, axis=1))
+def _rms(blocks: Iterable[Array]) -> Array:
+    """Root mean square of each row over consecutive blocks, summed block by block."""
+    total, n = np.zeros(0), 0
+    for block in blocks:
+        squares = np.sum(np.ascontiguousarray(block) ** 2, axis=1)
+        total = total + squares if n else squares
+        n += block.shape[1]
+    return np.sqrt(total / n)

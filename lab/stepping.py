@@ -19,7 +19,7 @@ import numpy as np
 from mujoco import rollout
 
 from identification.recording import Array
-from lab import mjcf
+from lab import laws, mjcf
 from lab.errors import DivergedError
 from lab.rig import Rig
 
@@ -111,13 +111,28 @@ def highest_frequency(rig: Rig) -> float:
     return float(np.max(np.abs(np.linalg.eigvals(rig.state_space().A)), initial=0.0))
 
 
+def settling_time(rig: Rig) -> float:
+    """Time [s] over which the error of the steps builds up: the decay time of the mode that errs most.
+
+    The error of a mode λ grows like t λ (λ h)⁴ while its motion decays like exp(Re λ t).
+    """
+    poles = np.linalg.eigvals(rig.state_space().A)
+    decay = np.maximum(-poles.real, 1e-12 * np.abs(poles))
+    moving = np.abs(poles) > 0
+    if not moving.any():
+        return 0.0
+    return float(1 / decay[moving][np.argmax((np.abs(poles) ** 5 / np.where(moving, decay, 1.0))[moving])])
+
+
 class Stepper:
     """Advances a batch of copies of one structure, substep by substep, on all cores.
 
     Copies do not know of each other, so results do not depend on the number of threads.
     """
 
-    def __init__(self, rig: Rig, dt: float, substeps: int, position: Array, velocity: Array) -> None:
+    def __init__(
+        self, rig: Rig, dt: float, substeps: int, position: Array, velocity: Array, duration: float
+    ) -> None:
         """Place every copy at its start.
 
         Args:
@@ -126,11 +141,14 @@ class Stepper:
             substeps: per sample.
             position: from the operating point, shape (n_batch, n_dofs).
             velocity: shape (n_batch, n_dofs).
+            duration: of the record [s], for springs that drift over it.
         """
         self.rig, self.substeps, self.n_batch = rig, substeps, position.shape[0]
         model = copy.copy(rig.model)
         model.opt.timestep = dt / substeps
         model.opt.integrator = mujoco.mjtIntegrator.mjINT_RK4
+        laws.set_duration(model, duration)
+        _stiffen_friction(model)
         self._model = model
         self._data = [mujoco.MjData(model) for _ in range(min(os.cpu_count() or 1, self.n_batch))]
         self._states = np.zeros((self.n_batch, mujoco.mj_stateSize(model, STATE)))
@@ -159,7 +177,7 @@ class Stepper:
         if forces is None:
             forces = np.zeros((self.n_batch, m.nv, n_steps))
         control = np.ascontiguousarray(np.concatenate([controls, forces], axis=1).transpose(0, 2, 1))
-        with mjcf.quiet() as complaints, rollout.Rollout(nthread=len(self._data)) as pool:
+        with laws.acting(m), mjcf.quiet() as complaints, rollout.Rollout(nthread=len(self._data)) as pool:
             states, sensordata = pool.rollout(
                 m, self._data, self._states, control, control_spec=int(CONTROL), chunk_size=1
             )
@@ -195,3 +213,13 @@ def readings_at_rest(rig: Rig) -> Array:
     mujoco.mj_forward(rig.model, data)
     # What moves by rounding only is at rest: keep exact zeros exact.
     return np.where(np.abs(data.sensordata) < 1e-13, 0.0, data.sensordata)
+
+
+def _stiffen_friction(model: mujoco.MjModel) -> None:
+    """Lets dry friction stick within two substeps, as hard as MuJoCo's soft constraints go; the error is O(h)."""
+    reference, impedance = [2 * model.opt.timestep, 1.0], [0.9999, 0.9999, 0.001]
+    for solref, solimp in (
+        (model.dof_solref, model.dof_solimp),
+        (model.tendon_solref_fri, model.tendon_solimp_fri),
+    ):
+        solref[:], solimp[:, :3] = reference, impedance

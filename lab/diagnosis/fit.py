@@ -1,0 +1,173 @@
+"""Fit: maximum a posteriori of the model's parameters and of causes, by Levenberg and Marquardt."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import dataclass
+from os import cpu_count
+
+import numpy as np
+
+from identification.recording import Array
+from lab.diagnosis.misfit import Hypothesis, Misfit
+from lab.plant import NO_OBSERVER
+
+STEP, CAUSE_STEP = 3e-2, 1e-3
+"""Difference steps: in widths of the prior, and in units of a cause's scale."""
+POOL = ThreadPoolExecutor(min(cpu_count() or 1, 8))
+
+
+@dataclass(frozen=True, eq=False)
+class Fit:
+    """Where a fit came to.
+
+    Attributes:
+        theta: parameters of the model, in widths of the prior.
+        causes: hypotheses at their fitted values.
+        residual: measured less predicted, (n_outputs, n_total).
+        objective: -2 log posterior up to a constant: n log of every channel's residual power, plus θᵀθ.
+        information: Gauss-Newton information of all variables without the prior, (n, n).
+    """
+
+    theta: Array
+    causes: tuple[Hypothesis, ...]
+    residual: Array
+    objective: float
+    information: Array
+
+    @property
+    def deviance(self) -> float:
+        """-2 log likelihood, up to the same constant."""
+        return self.objective - float(self.theta @ self.theta)
+
+
+def objective(residual: Array, theta: Array) -> float:
+    """-2 log posterior with the noise of every channel at its most likely level."""
+    power = np.mean(residual**2, axis=1)
+    if not np.all(np.isfinite(power)):
+        return np.inf
+    return float(residual.shape[1] * np.sum(np.log(np.maximum(power, 1e-300))) + theta @ theta)
+
+
+def weights(residual: Array) -> Array:
+    """One over the residual's RMS, per channel."""
+    return 1 / np.sqrt(np.maximum(np.mean(residual**2, axis=1), 1e-300))
+
+
+def theta_slopes(
+    misfit: Misfit,
+    theta: Array,
+    causes: Sequence[Hypothesis],
+    observer: Array,
+    residual: Array,
+    n_train: Sequence[int] | None,
+) -> Array:
+    """Derivative of the residual by every parameter, (n_parameters, n_outputs, n_total)."""
+
+    def slope(j: int) -> Array:
+        moved = theta.copy()
+        moved[j] += STEP
+        return (misfit.residual(moved, causes, observer=observer, n_train=n_train) - residual) / STEP
+
+    return np.array(list(POOL.map(slope, range(theta.size)))).reshape(-1, *residual.shape)
+
+
+def cause_slopes(
+    misfit: Misfit,
+    theta: Array,
+    causes: Sequence[Hypothesis],
+    observer: Array,
+    residual: Array,
+    n_train: Sequence[int] | None,
+) -> Array:
+    """Derivative of the residual by every variable of the causes, (n_variables, n_outputs, n_total)."""
+    slopes = []
+    for i, cause in enumerate(causes):
+        for j in range(cause.n):
+            values = cause.values.copy()
+            values[j] += CAUSE_STEP
+            moved = [*causes[:i], cause.at(values), *causes[i + 1 :]]
+            slopes.append(
+                (misfit.residual(theta, moved, observer=observer, n_train=n_train) - residual) / CAUSE_STEP
+            )
+    return np.array(slopes).reshape(-1, *residual.shape)
+
+
+def moved_by(causes: Sequence[Hypothesis], step: Array) -> tuple[Hypothesis, ...]:
+    """The causes with a step added to all their variables."""
+    ends = np.cumsum([cause.n for cause in causes])
+    parts = np.split(step, ends[:-1]) if causes else []
+    return tuple(cause.at(cause.values + part) for cause, part in zip(causes, parts, strict=True))
+
+
+def fit(
+    misfit: Misfit,
+    theta: Array,
+    causes: Sequence[Hypothesis] = (),
+    *,
+    observer: Array = NO_OBSERVER,
+    iterations: int = 8,
+    refresh: int = 2,
+    tolerance: float = 0.5,
+    n_train: Sequence[int] | None = None,
+    told: Callable[[], None] | None = None,
+) -> Fit:
+    """Parameters and causes at the most likely values near where they start.
+
+    Args:
+        misfit: model and data.
+        theta: parameters at the start.
+        causes: hypotheses at the start.
+        observer: gain that pulls the state to the measurements; none for the plain simulation error.
+        iterations: at most.
+        refresh: iterations for which slopes of the parameters are kept.
+        tolerance: stop when an iteration with fresh slopes gains less than this in -2 log posterior.
+        n_train: samples of each record to use; all training samples when None.
+        told: called once an iteration.
+    """
+    causes = tuple(causes)
+    theta = np.asarray(theta, dtype=float)
+    n = theta.size
+    e = misfit.residual(theta, causes, observer=observer, n_train=n_train)
+    f, damping, age = objective(e, theta), 1e-3, refresh
+    slopes = np.zeros((0, *e.shape))
+    prior = np.concatenate([np.ones(n), np.zeros(sum(cause.n for cause in causes))])
+    information = np.zeros((prior.size, prior.size))
+    for _ in range(iterations):
+        if told is not None:
+            told()
+        if age >= refresh:
+            slopes, age = theta_slopes(misfit, theta, causes, observer, e, n_train), 0
+        fresh = age == 0
+        age += 1
+        J = np.concatenate([slopes, cause_slopes(misfit, theta, causes, observer, e, n_train)])
+        w = weights(e)
+        Jw = (J * w[:, None]).reshape(prior.size, -1)
+        information = Jw @ Jw.T
+        H = information + np.diag(prior)
+        g = Jw @ (e * w[:, None]).ravel() + prior * np.concatenate([theta, np.zeros(prior.size - n)])
+        if not (np.all(np.isfinite(H)) and np.all(np.isfinite(g))):
+            break
+        step = None
+        for _ in range(6):
+            scaled = H + damping * np.diag(np.diag(H)) + 1e-12 * np.trace(H) * np.eye(prior.size)
+            d = -np.linalg.solve(scaled, g)
+            trial, trial_causes = theta + d[:n], moved_by(causes, d[n:])
+            trial_e = misfit.residual(trial, trial_causes, observer=observer, n_train=n_train)
+            trial_f = objective(trial_e, trial)
+            if trial_f < f:
+                step = f - trial_f
+                break
+            damping = max(damping, 1e-3) * 8
+        if step is None:
+            if fresh:
+                break
+            age, damping = refresh, 1e-2
+            continue
+        theta, causes, e, f, damping = trial, trial_causes, trial_e, trial_f, max(damping / 8, 1e-6)
+        if step < tolerance:
+            if fresh:
+                break
+            age = refresh
+    return Fit(theta, causes, e, f, information)

@@ -1,0 +1,173 @@
+"""Misfit: measured less predicted, for any change of the model's parameters and any set of causes."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+
+from identification.recording import Array, Recording
+from lab.effects.effect import Effect
+from lab.effects.survey import Guess, Survey
+from lab.plant import NO_OBSERVER, Plant, ready
+from lab.twin import Twin
+
+
+@dataclass(frozen=True, eq=False)
+class Hypothesis:
+    """A cause at a place, with fitted variables in units of a large step.
+
+    Positive variables are fitted as logarithms, so that every step is possible.
+
+    Attributes:
+        kind: class of the effect.
+        location: where it sits.
+        guess: start and scale of its variables.
+        values: where the fit stands, shape (n_variables,).
+    """
+
+    kind: type[Effect]
+    location: str
+    guess: Guess
+    values: Array
+
+    @classmethod
+    def starting(cls, kind: type[Effect], location: str, guess: Guess) -> Hypothesis:
+        """The hypothesis at its guess."""
+        values = [
+            np.log(guess.start[name] / scale) if name in kind.positive else guess.start[name] / scale
+            for name, scale in guess.scale.items()
+        ]
+        return cls(kind, location, guess, np.array(values, dtype=float))
+
+    @property
+    def n(self) -> int:
+        """Number of fitted variables."""
+        return self.values.size
+
+    @property
+    def effect(self) -> Effect:
+        """The effect at the present values."""
+        values: dict[str, Any] = dict(self.guess.fixed or {})
+        for (name, scale), value in zip(self.guess.scale.items(), self.values, strict=True):
+            values[name] = scale * float(
+                np.exp(np.clip(value, -40, 40)) if name in self.kind.positive else value
+            )
+        return self.kind.of(self.location, values)
+
+    def at(self, values: Array) -> Hypothesis:
+        """The hypothesis at other values."""
+        return replace(self, values=np.asarray(values, dtype=float))
+
+    def __repr__(self) -> str:
+        return f"{self.kind.cause}@{self.location}"
+
+
+@dataclass(frozen=True, eq=False)
+class Parameters:
+    """What the model has already: a factor on every mass, stiffness and damping, each with a prior.
+
+    Attributes:
+        names: of the parameters.
+        widths: one standard deviation of the logarithm of each factor.
+    """
+
+    names: tuple[str, ...]
+    widths: Array
+    n_bodies: int
+    n_springs: int
+
+    @property
+    def n(self) -> int:
+        """Number of parameters."""
+        return self.widths.size
+
+    def factors(self, theta: Array) -> tuple[Array, Array, Array]:
+        """Factors on masses, stiffnesses and dampings at `theta`, in units of the prior's width."""
+        factors = np.exp(np.clip(theta * self.widths, -3, 3))
+        a, b = self.n_bodies, self.n_bodies + self.n_springs
+        return factors[:a], factors[a:b], factors[b:]
+
+
+@dataclass(frozen=True, eq=False)
+class Misfit:
+    """Recorded data against the twin of a model.
+
+    Attributes:
+        twin: of the model.
+        survey: of rig and data; None until the first fit.
+        parameters: of the model.
+        records: inputs (n_inputs, n), outputs (n_outputs, n) and state at the start of each record.
+        dt: sample time [s].
+        n_train: samples at the start of each record that fits may see.
+        substeps: of the kernel.
+    """
+
+    twin: Twin
+    parameters: Parameters
+    records: tuple[tuple[Array, Array], ...]
+    dt: float
+    n_train: tuple[int, ...]
+    survey: Survey | None = None
+    substeps: int = 6
+
+    @classmethod
+    def of(cls, recording: Recording, twin: Twin, parameters: Parameters, *, share: float = 0.7) -> Misfit:
+        """The misfit of a recording whose channels are those of the twin."""
+        records = tuple((np.asarray(r.inputs[:, :]), np.asarray(r.outputs[:, :])) for r in recording.records)
+        n_train = tuple(int(share * outputs.shape[1]) for _, outputs in records)
+        return cls(twin, parameters, records, recording.dt, n_train)
+
+    @cached_property
+    def measured(self) -> Array:
+        """Training outputs of all records, one behind the other."""
+        return np.concatenate(
+            [y[:, :n] for (_, y), n in zip(self.records, self.n_train, strict=True)], axis=1
+        )
+
+    def plant(self, theta: Array, causes: Sequence[Hypothesis] = ()) -> Plant:
+        """The plant at parameters `theta` with causes in it."""
+        plant = self.twin.changed(*self.parameters.factors(theta))
+        for cause in causes:
+            assert self.survey is not None
+            plant = cause.effect.explain(plant, self.survey)
+        return plant
+
+    def residual(
+        self,
+        theta: Array,
+        causes: Sequence[Hypothesis] = (),
+        *,
+        observer: Array = NO_OBSERVER,
+        n_train: Sequence[int] | None = None,
+    ) -> Array:
+        """Measured less predicted training outputs, (n_outputs, n_total); zero where a sample is missing."""
+        plant = self.plant(theta, causes)
+        responder = ready(plant, self.dt, substeps=self.substeps)
+        observer = _widened(observer, plant, self.twin.plant.n_dofs, responder.matrices[0].shape[0])
+        parts = []
+        for (u, y), n in zip(self.records, n_train or self.n_train, strict=True):
+            predicted = responder.outputs(u, n, observer=observer, measured=y, n_record=y.shape[1])
+            parts.append(y[:, :n] - predicted)
+        e = np.concatenate(parts, axis=1)
+        missing = np.isnan(self.measured[:, : e.shape[1]])
+        if missing.any():
+            e[missing] = 0.0
+        return e
+
+
+def _widened(observer: Array, plant: Plant, n: int, n_states: int) -> Array:
+    """An observer of n degrees of freedom for a plant that has more of them, or lagging channels, behind."""
+    if not observer.size or observer.shape[0] == n_states:
+        return observer
+    wide = np.zeros((n_states, observer.shape[1]))
+    # What is tied to a body is corrected along with it: a rigid carry-over through its stiffness.
+    K, m = plant.stiffness, plant.n_dofs
+    carried = -np.linalg.lstsq(K[n:, n:], K[n:, :n], rcond=None)[0] if m > n else np.zeros((0, n))
+    for part in range(2):
+        wide[part * m : part * m + n] = observer[part * n : (part + 1) * n]
+        wide[part * m + n : (part + 1) * m] = carried @ observer[part * n : (part + 1) * n]
+    return wide

@@ -1,0 +1,214 @@
+"""Search: every cause at every place, screened cheaply; the best refitted completely and compared by evidence."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from identification.recording import Array
+from lab.diagnosis.calibrate import Calibration
+from lab.diagnosis.evidence import minus_two_log_evidence
+from lab.diagnosis.fit import POOL, Fit, cause_slopes, fit, moved_by, objective, theta_slopes, weights
+from lab.diagnosis.misfit import Hypothesis, Misfit
+from lab.diagnosis.observer import kalman_gain
+from lab.effects.effect import Effect
+from lab.plant import NO_OBSERVER
+
+OWN_PARAMETERS = {"mass": "mass_change", "stiffness": "stiffness_change", "damping": "damping_change"}
+SCREEN_SAMPLES = 4096
+REFITTED, PER_CAUSE, POLISHED = 10, 2, 3
+
+
+@dataclass(frozen=True, eq=False)
+class Candidate:
+    """A cause at a place with the evidence for it.
+
+    Attributes:
+        cause: name of the cause.
+        location: where it sits.
+        fit: with it.
+        gain: 2 log evidence gained over the model without it.
+        parameter: number of the model's parameter that leaves its tolerance, for a change of what the model has already.
+    """
+
+    cause: str
+    location: str
+    fit: Fit
+    gain: float
+    parameter: int | None = None
+
+
+@dataclass(frozen=True, eq=False)
+class Screened:
+    """Score of one hypothesis after a few steps with the model's parameters projected out."""
+
+    hypothesis: Hypothesis
+    score: float
+
+
+def hypotheses(misfit: Misfit, effects: Mapping[str, type[Effect]]) -> list[Hypothesis]:
+    """Every cause at every place from every starting value."""
+    survey = misfit.survey
+    assert survey is not None
+    return [
+        Hypothesis.starting(kind, location, guess)
+        for kind in effects.values()
+        for location in kind.places(survey.rig)
+        for guess in kind.guesses(survey, location)
+    ]
+
+
+def screen(
+    misfit: Misfit,
+    theta: Array,
+    present: Sequence[Hypothesis],
+    observer: Array,
+    proposed: Sequence[Hypothesis],
+) -> list[Screened]:
+    """Hypotheses by falling score: the likelihood gained in a few steps, less the price of their variables."""
+    n_train = tuple(min(n, SCREEN_SAMPLES) for n in misfit.n_train)
+    e = misfit.residual(theta, present, observer=observer, n_train=n_train)
+    slopes = np.concatenate(
+        [
+            theta_slopes(misfit, theta, present, observer, e, n_train),
+            cause_slopes(misfit, theta, present, observer, e, n_train),
+        ]
+    )
+    base = objective(e, theta)
+    w = weights(e)
+    J = (slopes * w[:, None]).reshape(slopes.shape[0], -1)
+    prior = np.concatenate([np.ones(theta.size), np.zeros(len(slopes) - theta.size)])
+    H = np.linalg.inv(
+        J @ J.T + np.diag(prior) + 1e-9 * np.trace(J @ J.T) / max(len(J), 1) * np.diag(1 - prior)
+    )
+    start = np.concatenate([theta, np.zeros(len(slopes) - theta.size)])
+
+    def projected(r: Array) -> tuple[Array, float]:
+        """Residual less what the model's parameters can explain of it, and its objective."""
+        d = -H @ (J @ (r * w[:, None]).ravel() + prior * start)
+        left = r + np.tensordot(d, slopes, axes=1)
+        return left, objective(left, theta + d[: theta.size])
+
+    def score(hypothesis: Hypothesis) -> Screened:
+        h = hypothesis
+        r = misfit.residual(theta, [*present, h], observer=observer, n_train=n_train)
+        left, f = projected(r)
+        damping = 1e-2
+        for _ in range(4 if h.n else 0):
+            if not np.isfinite(f):
+                break
+            own = cause_slopes(misfit, theta, [*present, h], observer, r, n_train)[-h.n :]
+            if not np.all(np.isfinite(own)):
+                break
+            own = np.array(
+                [x - np.tensordot(H @ (J @ (x * w[:, None]).ravel()), slopes, axes=1) for x in own]
+            )
+            v = weights(left)
+            A = (own * v[:, None]).reshape(h.n, -1)
+            G, g = A @ A.T, A @ (left * v[:, None]).ravel()
+            if not np.trace(G) > 0:
+                break
+            for _ in range(4):
+                step = -np.linalg.solve(
+                    G + (damping * np.diag(np.diag(G)) + 1e-9 * np.trace(G) * np.eye(h.n)), g
+                )
+                (trial,) = moved_by([h], step)
+                trial_r = misfit.residual(theta, [*present, trial], observer=observer, n_train=n_train)
+                trial_left, trial_f = projected(trial_r)
+                if trial_f < f:
+                    break
+                damping = max(damping, 1e-2) * 10
+            else:
+                break
+            gained = f - trial_f
+            h, r, left, f, damping = trial, trial_r, trial_left, trial_f, damping / 5
+            if gained < 1:
+                break
+        return Screened(h, base - f - max(h.n, 1) * float(np.log(e.size)))
+
+    return sorted(POOL.map(score, proposed), key=lambda s: -s.score if np.isfinite(s.score) else np.inf)
+
+
+def search(
+    calibration: Calibration, present: Fit, effects: Mapping[str, type[Effect]]
+) -> tuple[list[Candidate], list[Screened]]:
+    """Candidates for one more cause beside those present, best first, and the whole screening."""
+    misfit = calibration.misfit
+    causes = present.causes
+    if causes:
+        theta, observer = present.theta, NO_OBSERVER
+    else:
+        theta, observer = calibration.guided.theta, calibration.observer
+    proposed = hypotheses(misfit, effects)
+    taken = {(cause.kind, cause.location) for cause in causes}
+    proposed = [h for h in proposed if (h.kind, h.location) not in taken]
+    rows = screen(misfit, theta, causes, observer, proposed)
+    picked: list[Hypothesis] = []
+    places: set[tuple[str, str]] = set()
+    for row in rows:
+        h = row.hypothesis
+        key = (h.kind.cause, h.location)
+        same = sum(other.kind is h.kind for other in picked)
+        if key not in places and same < PER_CAUSE and len(picked) < REFITTED and row.score > -30:
+            picked.append(h)
+            places.add(key)
+    without = minus_two_log_evidence(present)
+    candidates = _wrong_parameters(misfit, present, without, effects)
+    refits = [_refit(calibration, theta, causes, h) for h in picked]
+    scored = [_candidate(f, without) for f in refits if f is not None]
+    scored.sort(key=lambda c: -c.gain)
+    polished = [_candidate(_polish(misfit, c.fit), without) for c in scored[:POLISHED]]
+    best = [max(old, new, key=lambda c: c.gain) for old, new in zip(scored, polished, strict=False)]
+    candidates += best + scored[POLISHED:]
+    return sorted(candidates, key=lambda c: -c.gain), rows
+
+
+def _refit(
+    calibration: Calibration, theta: Array, present: Sequence[Hypothesis], h: Hypothesis
+) -> Fit | None:
+    """A complete fit with the new cause, trusting the measurements less and less."""
+    misfit, causes = calibration.misfit, (*present, h)
+    shares = [] if present else [s for s in (calibration.share, calibration.share / 10) if s > 1e-3]
+    try:
+        for share in shares:
+            guided = fit(
+                misfit, theta, causes, observer=kalman_gain(misfit, theta, share), iterations=3, tolerance=20
+            )
+            theta, causes = guided.theta, guided.causes
+        found = fit(misfit, theta, causes, iterations=8)
+    except (np.linalg.LinAlgError, ValueError):
+        return None
+    return found if np.isfinite(found.objective) else None
+
+
+def _polish(misfit: Misfit, found: Fit) -> Fit:
+    return fit(misfit, found.theta, found.causes, iterations=15, refresh=1, tolerance=0.1)
+
+
+def _candidate(found: Fit, without: float) -> Candidate:
+    last = found.causes[-1]
+    return Candidate(last.kind.cause, last.location, found, without - minus_two_log_evidence(found))
+
+
+def _wrong_parameters(
+    misfit: Misfit, present: Fit, without: float, effects: Mapping[str, type[Effect]]
+) -> list[Candidate]:
+    """Masses, stiffnesses and dampings of the model that leave their tolerance."""
+    found = []
+    for j, name in enumerate(misfit.parameters.names):
+        group, _, place = name.partition(" ")
+        if OWN_PARAMETERS[group] not in effects:
+            continue
+        gain = without - minus_two_log_evidence(present, free=j)
+        if gain > 0 or abs(present.theta[j]) > 1:
+            found.append(Candidate(OWN_PARAMETERS[group], place, present, gain, j))
+    return found
+
+
+def lifted(misfit: Misfit, parameter: int) -> Misfit:
+    """The misfit with the prior of one parameter out of the way."""
+    widths = misfit.parameters.widths.copy()
+    widths[parameter] *= 1e3
+    return replace(misfit, parameters=replace(misfit.parameters, widths=widths))

@@ -1,0 +1,37 @@
+"""An actuator that pushes more or less than it is told."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import ClassVar
+
+from lab.chain import Gain
+from lab.effects.effect import AtInput, Effect
+from lab.effects.survey import Guess, Survey
+from lab.plant import Plant
+from lab.rig import Rig
+
+
+@dataclass(frozen=True)
+class ActuatorGain(AtInput, Effect):
+    """An input channel pushes with 1 + r times the recorded force.
+
+    Attributes:
+        relative_change: r; -2 is a flipped sign.
+    """
+
+    cause: ClassVar[str] = "actuator_gain"
+    units: ClassVar[dict[str, str]] = {"relative_change": "1"}
+    relative_change: float
+
+    def apply(self, rig: Rig) -> Rig:
+        self.checked(rig)
+        return rig.with_chain(rig.chain.adding("actuators", Gain(self.location, self.relative_change)))
+
+    def explain(self, plant: Plant, survey: Survey) -> Plant:
+        i = survey.input(self.location)
+        return plant.with_input(i, gain=plant.input_paths[i].gain * (1 + self.relative_change))
+
+    @classmethod
+    def guesses(cls, survey: Survey, location: str) -> list[Guess]:
+        return [Guess({"relative_change": 0.0}, {"relative_change": 1.0})]

@@ -1,0 +1,158 @@
+"""What an effect is: a physical cause at a place, with a size.
+
+The same class hides a cause in a rig, to make data that have it, and lists the places where it could sit, to explain
+data that may have it.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, fields
+from typing import Any, ClassVar
+
+from identification.recording import Channel
+from lab.effects.survey import Guess, Survey
+from lab.errors import LabError, UnknownNameError
+from lab.plant import Plant
+from lab.rig import Rig
+
+EVERYWHERE = "*"
+"""Location of a change by one common factor."""
+
+
+@dataclass(frozen=True)
+class Effect:
+    """A cause at a place.
+
+    Attributes:
+        location: name of the spring, body, joint or channel; two of them joined by "|" for a pair.
+    """
+
+    cause: ClassVar[str] = ""
+    units: ClassVar[dict[str, str]] = {}
+    """Unit of every parameter."""
+    positive: ClassVar[tuple[str, ...]] = ()
+    """Parameters that are positive by nature; fits use their logarithm."""
+    location: str
+
+    def apply(self, rig: Rig) -> Rig:
+        """The rig that has the effect.
+
+        Raises:
+            UnknownNameError: the location does not exist.
+            LabError: the size is impossible.
+        """
+        raise NotImplementedError
+
+    def explain(self, plant: Plant, survey: Survey) -> Plant:
+        """The plant that has the effect: the same change as `apply`, on the rig's fast twin."""
+        raise NotImplementedError
+
+    @classmethod
+    def places(cls, rig: Rig) -> tuple[str, ...]:
+        """Every location where the effect could sit in this rig."""
+        raise NotImplementedError
+
+    @classmethod
+    def guesses(cls, survey: Survey, location: str) -> list[Guess]:
+        """Where fits of the effect at a location start; none for a parameter that the model has already."""
+        return []
+
+    @classmethod
+    def parameter_names(cls) -> tuple[str, ...]:
+        """Names of the effect's parameters, as in the catalogue of causes."""
+        return tuple(name for name in cls.units)
+
+    @classmethod
+    def of(cls, location: str, values: Mapping[str, Any]) -> Effect:
+        """The effect whose fitted variables, those of `guesses`, have the values given."""
+        return cls(location, **values)
+
+    @property
+    def parameters(self) -> dict[str, float]:
+        """Value of every parameter that is set."""
+        values = {name: getattr(self, name) for name in self.parameter_names()}
+        return {name: value for name, value in values.items() if value is not None}
+
+    def to_data(self) -> dict[str, Any]:
+        """Plain data for JSON and TOML."""
+        values = {f.name: getattr(self, f.name) for f in fields(self)}
+        return {"cause": self.cause, **{name: value for name, value in values.items() if value is not None}}
+
+    def require(self, name: str, known: Sequence[str], what: str) -> None:
+        """Check that a name in the location exists.
+
+        Raises:
+            UnknownNameError: it does not.
+        """
+        if name not in known:
+            raise UnknownNameError(
+                f"{self.cause} at {self.location!r}: there is no {what} {name!r}; there are {', '.join(known) or 'none'}"
+            )
+
+    def require_positive(self, *names: str) -> None:
+        """Check that parameters are positive.
+
+        Raises:
+            LabError: one is not.
+        """
+        for name in names:
+            if not getattr(self, name) > 0:
+                raise LabError(
+                    f"{self.cause} at {self.location!r}: {name} is {getattr(self, name)}; expected more than 0"
+                )
+
+
+class AtSpring:
+    """Sits in a joint or tendon with stiffness or damping."""
+
+    @classmethod
+    def places(cls, rig: Rig) -> tuple[str, ...]:
+        """Every spring."""
+        return tuple(spring.name for spring in rig.springs)
+
+
+class AtBody:
+    """Sits on a body that can move."""
+
+    @classmethod
+    def places(cls, rig: Rig) -> tuple[str, ...]:
+        """Every body that can move."""
+        return rig.bodies
+
+
+class AtOutput:
+    """Sits in an output channel."""
+
+    @classmethod
+    def places(cls, rig: Rig) -> tuple[str, ...]:
+        """Every connected output channel."""
+        return _names(rig.outputs)
+
+    def checked(self: Any, rig: Rig) -> Any:
+        """The effect, once its channel is known to exist."""
+        self.require(self.location, _names(rig.outputs), "output channel")
+        return self
+
+
+class AtInput:
+    """Sits in an input channel."""
+
+    @classmethod
+    def places(cls, rig: Rig) -> tuple[str, ...]:
+        """Every connected input channel."""
+        return _names(rig.inputs)
+
+    def checked(self: Any, rig: Rig) -> Any:
+        """The effect, once its channel is known to exist."""
+        self.require(self.location, _names(rig.inputs), "input channel")
+        return self
+
+
+def pairs(names: Sequence[str]) -> tuple[str, ...]:
+    """Every pair of names in their order, joined by "|"."""
+    return tuple(f"{a}|{b}" for i, a in enumerate(names) for b in names[i + 1 :])
+
+
+def _names(channels: Sequence[Channel]) -> tuple[str, ...]:
+    return tuple(channel.name for channel in channels)

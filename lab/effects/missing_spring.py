@@ -1,0 +1,170 @@
+"""A connection that the model leaves out."""
+
+from __future__ import annotations
+
+import xml.etree.ElementTree as ET
+from dataclasses import dataclass, replace
+from functools import lru_cache
+from typing import ClassVar
+
+import mujoco
+import numpy as np
+
+from lab.effects.edits import body_element, fixed_tendon, numbers, with_tendon
+from lab.effects.effect import Effect, pairs
+from lab.effects.survey import Guess, Survey
+from lab.errors import LabError
+from lab.mjcf import number
+from lab.plant import Plant
+from lab.rig import Rig
+from lab.twin import spring_rows
+
+WORLD = "world"
+
+
+@dataclass(frozen=True)
+class MissingSpring(Effect):
+    """Two bodies, or a body and the ground, are tied by a spring that the model does not have.
+
+    Between bodies that slide along one line the spring acts along that line; otherwise it joins their origins.
+
+    Attributes:
+        stiffness: [N/m].
+        damping: [N s/m].
+    """
+
+    cause: ClassVar[str] = "missing_spring"
+    units: ClassVar[dict[str, str]] = {"stiffness": "N/m", "damping": "N s/m"}
+    stiffness: float
+    damping: float = 0.0
+
+    def apply(self, rig: Rig) -> Rig:
+        a, _, b = self.location.partition("|")
+        for name in (a, b):
+            self.require(name, (WORLD, *rig.bodies), "body")
+        tendon = _straight(rig, a, b)
+        if tendon is None:
+            rig, tendon = _spatial(rig, a, b)
+        tendon.set("name", f"spring@{a}|{b}")
+        tendon.set("stiffness", number(self.stiffness))
+        tendon.set("damping", number(self.damping))
+        return with_tendon(rig, tendon)
+
+    def explain(self, plant: Plant, survey: Survey) -> Plant:
+        row = self._row(survey.rig)
+        return replace(
+            plant,
+            stiffness=plant.stiffness + self.stiffness * np.outer(row, row),
+            damping=plant.damping + self.damping * np.outer(row, row),
+        )
+
+    @classmethod
+    def guesses(cls, survey: Survey, location: str) -> list[Guess]:
+        row = cls(location, 1.0)._row(survey.rig)
+        stiff = survey.push(row) / survey.travel(row)
+        return [Guess({"stiffness": 0.0}, {"stiffness": stiff})]
+
+    def _row(self, rig: Rig) -> np.ndarray:
+        """Extension of the new spring per displacement."""
+        return _row_of(rig, self.location)
+
+    @classmethod
+    def places(cls, rig: Rig) -> tuple[str, ...]:
+        """Every pair of bodies, and every body and the ground, not tied by a spring yet."""
+        return tuple(
+            pair for pair in pairs((WORLD, *rig.bodies)) if pair not in _tied(rig) and _possible(rig, pair)
+        )
+
+
+@lru_cache(maxsize=4096)
+def _row_of(rig: Rig, location: str) -> np.ndarray:
+    return spring_rows(MissingSpring(location, 1.0).apply(rig))[-1]
+
+
+def _lone_slide(rig: Rig, body: str) -> tuple[str, np.ndarray] | None:
+    """Name and world axis of the only joint between a body and the ground, if that is a slide."""
+    m = rig.model
+    index = m.body(body).id
+    if m.body_jntnum[index] != 1 or m.body_weldid[m.body_parentid[index]] != 0:
+        return None
+    joint = m.body_jntadr[index]
+    if m.jnt_type[joint] != int(mujoco.mjtJoint.mjJNT_SLIDE):
+        return None
+    data = mujoco.MjData(m)
+    data.qpos[:] = rig.operating_point
+    mujoco.mj_kinematics(m, data)
+    return m.joint(joint).name, data.xaxis[joint].copy()
+
+
+def _straight(rig: Rig, a: str, b: str) -> ET.Element | None:
+    """A fixed tendon between bodies that slide along one direction, at rest where they rest."""
+    slides = [(1.0 if body == b else -1.0, _lone_slide(rig, body)) for body in (a, b) if body != WORLD]
+    if any(slide is None or not slide[0] for _, slide in slides):
+        return None
+    axes = [slide[1] for _, slide in slides if slide is not None]
+    along = float(axes[0] @ axes[-1])
+    if abs(abs(along) - 1) > 1e-9:
+        return None
+    signs = [1.0, 1.0] if along > 0 else [1.0, -1.0]
+    joints = {
+        slide[0]: sign * turn for (sign, slide), turn in zip(slides, signs, strict=False) if slide is not None
+    }
+    tendon = fixed_tendon("", joints)
+    at_rest = sum(c * rig.operating_point[rig.dofs.index(joint)] for joint, c in joints.items())
+    tendon.set("springlength", number(at_rest))
+    return tendon
+
+
+def _spatial(rig: Rig, a: str, b: str) -> tuple[Rig, ET.Element]:
+    """A spatial tendon between the origins of two bodies, at rest where they rest."""
+    if WORLD in (a, b):
+        raise LabError(
+            f"missing_spring at '{a}|{b}': the body can move in several directions, so a spring to the ground has none; name "
+            "two bodies"
+        )
+    data = mujoco.MjData(rig.model)
+    data.qpos[:] = rig.operating_point
+    mujoco.mj_kinematics(rig.model, data)
+    length = float(np.linalg.norm(data.body(a).xpos - data.body(b).xpos))
+    if length == 0:
+        raise LabError(
+            f"missing_spring at '{a}|{b}': the bodies share their origin, so the spring has no direction"
+        )
+
+    def edit(root: ET.Element) -> None:
+        for body in (a, b):
+            element, name = body_element(root, body), f"origin@{body}"
+            if element.find(f"site[@name='{name}']") is None:
+                ET.SubElement(element, "site", name=name, pos=numbers([0.0, 0.0, 0.0]))
+
+    tendon = ET.Element("spatial", springlength=number(length))
+    for body in (a, b):
+        ET.SubElement(tendon, "site", site=f"origin@{body}")
+    return rig.edited(edit), tendon
+
+
+def _possible(rig: Rig, pair: str) -> bool:
+    a, _, b = pair.partition("|")
+    return WORLD not in (a, b) or _lone_slide(rig, b) is not None
+
+
+def _tied(rig: Rig) -> set[str]:
+    """Pairs of bodies that a spring ties already."""
+    m = rig.model
+    order = [WORLD, *rig.bodies]
+    found = set()
+    for spring in rig.springs:
+        if spring.kind == "joint":
+            body = m.jnt_bodyid[spring.index]
+            ends = [m.body_parentid[body], body]
+        else:
+            first = m.tendon_adr[spring.index]
+            wraps = range(first, first + m.tendon_num[spring.index])
+            fixed = m.wrap_type[first] == int(mujoco.mjtWrap.mjWRAP_JOINT)
+            ends = [m.jnt_bodyid[m.wrap_objid[w]] if fixed else m.site_bodyid[m.wrap_objid[w]] for w in wraps]
+            if fixed and len(set(ends)) == 1:
+                ends.append(0)
+        names = {WORLD if m.body_weldid[body] == 0 else m.body(body).name for body in ends}
+        if len(names) == 2:
+            found.add("|".join(sorted(names, key=order.index)))
+    return found

@@ -1,0 +1,41 @@
+"""A sensor that follows slowly."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import ClassVar
+
+from lab.chain import Lag
+from lab.effects.effect import AtOutput, Effect
+from lab.effects.survey import Guess, Survey
+from lab.plant import Plant
+from lab.rig import Rig
+
+
+@dataclass(frozen=True)
+class SensorLag(AtOutput, Effect):
+    """An output channel follows through a first-order low-pass.
+
+    Attributes:
+        corner_hz: corner frequency [Hz].
+    """
+
+    cause: ClassVar[str] = "sensor_lag"
+    units: ClassVar[dict[str, str]] = {"corner_hz": "Hz"}
+    positive: ClassVar[tuple[str, ...]] = ("corner_hz",)
+    corner_hz: float
+
+    def apply(self, rig: Rig) -> Rig:
+        self.require_positive("corner_hz")
+        self.checked(rig)
+        return rig.with_chain(rig.chain.adding("sensors", Lag(self.location, self.corner_hz)))
+
+    def explain(self, plant: Plant, survey: Survey) -> Plant:
+        i = survey.output(self.location)
+        return plant.with_output(i, lag=1 / (2 * math.pi * self.corner_hz))
+
+    @classmethod
+    def guesses(cls, survey: Survey, location: str) -> list[Guess]:
+        corner = 0.4 / survey.dt
+        return [Guess({"corner_hz": corner}, {"corner_hz": corner})]

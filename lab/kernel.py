@@ -1,0 +1,197 @@
+"""Kernel: responses of a linear structure with a few local force laws, sample by sample, compiled.
+
+Between samples the linear part is exact (matrix exponential); the force of a law is taken as a straight line over each
+substep and solved for implicitly at its end, which is of second order in the substep and stable for stiff laws. The same
+function runs uncompiled as `respond.py_func`.
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+from numba import njit
+
+CUBIC, QUADRATIC, BILINEAR, DEADBAND, STOP, COULOMB, BOUC_WEN, DRIFT = range(8)
+"""Laws; extension x, its rate v, and parameters p:
+
+CUBIC       p0 x³ + p1 x²
+QUADRATIC   p0 |v| v + p1 v³
+BILINEAR    p0 x for x > 0
+DEADBAND    -p1 clip(x, -p0, p0): what a spring of stiffness p1 loses by a play of ± p0
+STOP        p1 (x - p0) past p0, on the side p2 = ±1
+COULOMB     p0 tanh(v / p1), or sign(v) with sticking where p1 = 0
+BOUC_WEN    z with ż = p0 v - (|v| z + v |z|) / (2 p1)
+DRIFT       p0 s x, s the share of the record that has passed
+"""
+
+
+@njit(cache=True, nogil=True)
+def force(law, p, x, v, s):  # type: ignore[no-untyped-def]
+    """Restoring force of a law without memory."""
+    if law == CUBIC:
+        return (p[0] * x + p[1]) * x * x
+    if law == QUADRATIC:
+        return (p[0] * abs(v) + p[1] * v * v) * v
+    if law == BILINEAR:
+        return p[0] * x if x > 0 else 0.0
+    if law == DEADBAND:
+        return -p[1] * min(max(x, -p[0]), p[0])
+    if law == STOP:
+        past = p[2] * (x - p[0])
+        return p[2] * p[1] * past if past > 0 else 0.0
+    if law == COULOMB:
+        return p[0] * math.tanh(v / p[1]) if p[1] > 0 else 0.0
+    if law == DRIFT:
+        return p[0] * s * x
+    return 0.0
+
+
+@njit(cache=True, nogil=True)
+def _coulomb(p, v_free, a):  # type: ignore[no-untyped-def]
+    """Friction force g at the end of a substep, where the velocity is v_free + a g with a < 0."""
+    stick = min(max(-v_free / a, -p[0]), p[0])
+    if p[1] <= 0:
+        return stick
+    low, high = -p[0], p[0]
+    g = stick
+    # g - F tanh((v_free + a g) / eps) rises with g: Newton inside a shrinking bracket.
+    for _ in range(60):
+        t = math.tanh((v_free + a * g) / p[1])
+        r = g - p[0] * t
+        if r > 0:
+            high = g
+        else:
+            low = g
+        if abs(r) < 1e-12 * p[0]:
+            break
+        slope = 1.0 - p[0] * (1.0 - t * t) * a / p[1]
+        g = g - r / slope
+        if not low < g < high:
+            g = 0.5 * (low + high)
+    return g
+
+
+@njit(cache=True, nogil=True)
+def respond(F, G, P, Q, X, V, C, D, E, laws, params, u, x0, substeps, n_record, L, y):  # type: ignore[no-untyped-def]
+    """Outputs, shape (n_samples, n_outputs), of one record; NaN from where the motion diverges.
+
+    Args:
+        F, G: state and held input over one substep, (n_states, n_states) and (n_states, n_inputs).
+        P, Q: forces of the laws that fall from one to zero and rise from zero to one over it, (n_states, n_laws).
+        X, V: rows of extension and of its rate, (n_laws, n_states).
+        C, D, E: outputs from state, input and law forces.
+        laws, params: law numbers (n_laws,) and parameters (n_laws, 3).
+        u: inputs, (n_samples, n_inputs).
+        x0: state at the start.
+        substeps: per sample.
+        n_record: samples of the whole record, for drift.
+        L: observer gain (n_states, n_outputs) that pulls the state to the measured `y`, or no rows.
+        y: measured outputs, (n_samples, n_outputs), used with an observer only; NaN where missing.
+    """
+    n, n_states, n_inputs, n_outputs, n_laws = u.shape[0], F.shape[0], u.shape[1], C.shape[0], laws.size
+    out = np.empty((n, n_outputs))
+    x, free, held = x0.copy(), np.zeros(n_states), np.zeros(n_states)
+    g, z = np.zeros(n_laws), np.zeros(n_laws)
+    a_x, a_v = np.zeros(n_laws), np.zeros(n_laws)
+    for e in range(n_laws):
+        for j in range(n_states):
+            a_x[e] += X[e, j] * Q[j, e]
+            a_v[e] += V[e, j] * Q[j, e]
+    observed = L.shape[0] > 0
+    for k in range(n):
+        s = k / n_record
+        for pull in range(2 if observed else 1):
+            for e in range(n_laws):
+                xe, ve = 0.0, 0.0
+                for j in range(n_states):
+                    xe += X[e, j] * x[j]
+                    ve += V[e, j] * x[j]
+                if laws[e] == BOUC_WEN:
+                    g[e] = z[e]
+                elif laws[e] != COULOMB:
+                    g[e] = force(laws[e], params[e], xe, ve, s)
+            if pull == 1:
+                break
+            for i in range(n_outputs):
+                value = 0.0
+                for j in range(n_states):
+                    value += C[i, j] * x[j]
+                for j in range(n_inputs):
+                    value += D[i, j] * u[k, j]
+                for e in range(n_laws):
+                    value += E[i, e] * g[e]
+                out[k, i] = value
+            if observed:
+                for i in range(n_outputs):
+                    error = y[k, i] - out[k, i]
+                    if error == error:
+                        for j in range(n_states):
+                            x[j] += L[j, i] * error
+        for j in range(n_states):
+            value = 0.0
+            for i in range(n_inputs):
+                value += G[j, i] * u[k, i]
+            held[j] = value
+        for step in range(substeps):
+            s = (k + (step + 1) / substeps) / n_record
+            for j in range(n_states):
+                value = held[j]
+                for i in range(n_states):
+                    value += F[j, i] * x[i]
+                for e in range(n_laws):
+                    value += P[j, e] * g[e]
+                free[j] = value
+            # With several laws, each is solved in turn given the others, until none moves.
+            for _ in range(1 if n_laws <= 1 else 12):
+                moved = 0.0
+                for e in range(n_laws):
+                    xf, vf, xs = 0.0, 0.0, 0.0
+                    for j in range(n_states):
+                        value = free[j]
+                        for other in range(n_laws):
+                            if other != e:
+                                value += Q[j, other] * g[other]
+                        xf += X[e, j] * value
+                        vf += V[e, j] * value
+                        xs += X[e, j] * x[j]
+                    old = g[e]
+                    if laws[e] == COULOMB:
+                        g[e] = _coulomb(params[e], vf, a_v[e])
+                    elif laws[e] == BOUC_WEN:
+                        trial = g[e]
+                        for _ in range(8):
+                            dx = xf + a_x[e] * trial - xs
+                            mean = 0.5 * (z[e] + trial)
+                            trial = (
+                                z[e]
+                                + params[e, 0] * dx
+                                - 0.5 / params[e, 1] * (abs(dx) * mean + dx * abs(mean))
+                            )
+                        g[e] = trial
+                    else:
+                        trial = g[e]
+                        for _ in range(12):
+                            following = force(laws[e], params[e], xf + a_x[e] * trial, vf + a_v[e] * trial, s)
+                            change = following - trial
+                            trial = following
+                            if abs(change) <= 1e-13 * abs(trial):
+                                break
+                        g[e] = trial
+                    moved = max(moved, abs(g[e] - old) - 1e-12 * abs(g[e]))
+                if moved <= 0.0:
+                    break
+            for e in range(n_laws):
+                if laws[e] == BOUC_WEN:
+                    z[e] = g[e]
+            finite = True
+            for j in range(n_states):
+                value = free[j]
+                for e in range(n_laws):
+                    value += Q[j, e] * g[e]
+                x[j] = value
+                finite = finite and abs(value) < 1e100
+            if not finite:
+                out[k + 1 :] = np.nan
+                return out
+    return out
