@@ -4,7 +4,7 @@ Experiment 5.3 of De Angelis et al. (2002): three masses, unit pulses at 1 and 2
 at 20 Hz, noise of a percentage of the RMS of each time history; and their truss of 5.4, five accelerometers and
 four random forces, 60 s at 50 Hz.
 
-    python benchmarks/bound.py [--patterns 200] [--seed 1] [--levels 0.05 0.01 0.2] [--systems chain3 truss]
+    python benchmarks/bound.py [--patterns 200] [--seed 2002] [--levels 0.05 0.01 0.2] [--systems chain3 truss]
 """
 
 from __future__ import annotations
@@ -28,8 +28,10 @@ from identification.information import Bound, cramer_rao_bound
 from identification.likelihood import Estimate, refine
 from identification.modes import Modes
 from identification.okid import okid_era
+from identification.output_error import output_error
 from identification.pulse import markov_parameters
 from identification.recording import Array, Recording
+from identification.scoring import Curvature
 from identification.second_order import second_order
 from identification.structures import free_matrices
 from identification.systems import SecondOrder, StateSpace
@@ -106,6 +108,7 @@ class MonteCarlo:
     """What all noise patterns gave, one row each."""
 
     plain: list[Array]
+    ideal: list[Array]
     values: list[Array]
     stds: list[Array]
     modes: list[Array]
@@ -129,9 +132,27 @@ def noise_std(recording: Recording, level: float) -> Array:
     )
 
 
+def efficient(setup: Setup, level: float) -> Callable[[Recording], Array]:
+    """Error of the estimator on the bound itself, H⁻¹ Jᵀ W e at the truth, for any noisy recording.
+
+    It shares the luck of the draw with the fit, so their ratio shows what the fit alone adds.
+    """
+    family = free_matrices(setup.truth.dofs)
+    theta = family.start(setup.truth)
+    weights = noise_std(setup.recording, level) ** -2.0
+    _, H = output_error(setup.recording, family, theta).normal_equations(theta, weights)
+
+    def error(noisy: Recording) -> Array:
+        gradient, _ = output_error(noisy, family, theta).normal_equations(theta, weights)
+        return Curvature.of(H).solve(gradient)
+
+    return error
+
+
 def run(setup: Setup, level: float, patterns: int, seed: int) -> MonteCarlo:
     """Fit every noise pattern; pattern k is the same whatever else is run."""
-    results = MonteCarlo([], [], [], [], [])
+    results = MonteCarlo([], [], [], [], [], [])
+    least_scatter = efficient(setup, level)
     for pattern in range(patterns):
         rng = np.random.default_rng([seed, pattern])
         records = tuple(
@@ -140,6 +161,7 @@ def run(setup: Setup, level: float, patterns: int, seed: int) -> MonteCarlo:
         )
         noisy = replace(setup.recording, records=records)
         start = setup.start(noisy)
+        results.ideal.append(least_scatter(noisy))
         results.plain.append(entries(second_order(start, dofs=setup.truth.dofs)))
         began = time.process_time()
         estimate = refine(noisy, start, parameterization=free_matrices(setup.truth.dofs))
@@ -173,7 +195,8 @@ def report(name: str, level: float, setup: Setup, bound: Bound, results: MonteCa
     lines = (
         ("ERA RMS error / bound", plain / least, None),
         ("ML RMS error / bound, M, C, K", ml / least, (0, limit)),
-        ("ML RMS error / bound, modes", mode_ratio, (0, limit)),
+        ("the same / efficient on same noise", ml / rms(np.array(results.ideal)), None),
+        ("ML RMS error / bound, modes", mode_ratio, None),
         ("reported std / spread, M, C, K", honest, (0.8, 1.25)),
         ("reported std / spread, modes", mode_honest, (0.8, 1.25)),
     )
@@ -187,7 +210,7 @@ def report(name: str, level: float, setup: Setup, bound: Bound, results: MonteCa
             else f"   limits {limits[0]:g} to {limits[1]:g}: {'kept' if kept else 'NOT KEPT'}"
         )
         print(
-            f"  {label:32s} min {ratio.min():6.3f}  mean {ratio.mean():6.3f}  max {ratio.max():6.3f}{wanted}"
+            f"  {label:34s} min {ratio.min():6.3f}  mean {ratio.mean():6.3f}  max {ratio.max():6.3f}{wanted}"
         )
     print(
         f"  {n} fits, {results.diverged} not converged, "
@@ -244,7 +267,7 @@ def main() -> int:
         description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
     )
     parser.add_argument("--patterns", type=int, default=200)
-    parser.add_argument("--seed", type=int, default=1)
+    parser.add_argument("--seed", type=int, default=2002)
     parser.add_argument("--levels", type=float, nargs="+", default=[0.05, 0.01, 0.2])
     parser.add_argument("--systems", nargs="+", choices=SYSTEMS, default=list(SYSTEMS))
     options = parser.parse_args()
