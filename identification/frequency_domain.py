@@ -8,6 +8,7 @@ from dataclasses import replace
 import numpy as np
 
 from identification.horizon import resonance_peaks
+from identification.peaks import find_peaks
 from identification.plscf import plscf, response_rank
 from identification.recording import Recording
 from identification.spectra import FrequencyResponse, frequency_response, positive_spectra, unit_sizes
@@ -159,12 +160,6 @@ def _last_fall(response: FrequencyResponse) -> float:
     m = min(-(-LINE_VALUES // (n_outputs * n_inputs)), max(n_f // 8, 1))
     n = n_f // m
     means = np.mean(power[: n * m].reshape(n, m), axis=1)
-    fall, extreme, climbing = n - 1, 0.0, True
-    for k, value in enumerate(means.tolist()):
-        if climbing and value * FALL < extreme:
-            fall, extreme, climbing = k, value, False
-        elif not climbing and value > FALL * extreme:
-            extreme, climbing = value, True
-        else:
-            extreme = max(extreme, value) if climbing else min(extreme, value)
-    return float(response.frequency_hz[(fall + 1) * m - 1])
+    found = find_peaks(means, FALL, from_start=True)
+    last = found[-1].fall if found else n - 1
+    return float(response.frequency_hz[(last + 1) * m - 1])

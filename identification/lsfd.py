@@ -148,7 +148,7 @@ def lsfd(response: FrequencyResponse, modes: Modes, *, residuals: bool = False) 
     direct = np.zeros((n_outputs, n_inputs))
     lower, upper = direct.copy(), direct.copy()
     R = np.empty((n_modes, n_outputs, n_inputs), complex)
-    lines = _residual_lines(f, response.outputs) if residuals else [(np.ones(n_f),)] * n_outputs
+    lines = _residual_lines(f, response.outputs) if residuals else [(np.ones(n_f, complex),)] * n_outputs
     w = line_weights(response)[:, None]
     for o, extra in enumerate(lines):
         X = np.column_stack([unknown, *extra])
@@ -176,7 +176,7 @@ def _residual_lines(f: Array, outputs: tuple[Channel, ...]) -> list[tuple[Comple
             f"residual lines need outputs that measure motion, above 0 Hz, and {given}; "
             "choose the band with `between`, or leave `residuals` off"
         )
-    s: Complex = 2j * np.pi * f
+    s = np.asarray(2j * np.pi * f, dtype=np.complex128)
     powers = [DERIVATIVE[channel.quantity] for channel in outputs]
     return [(np.asarray(s ** (q - 2)), np.asarray(s**q)) for q in powers]
 
