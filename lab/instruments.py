@@ -5,6 +5,7 @@ Each instrument is a frozen dataclass with real-world units and ideal defaults; 
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 from dataclasses import dataclass, fields, replace
 from typing import Any, ClassVar
@@ -188,7 +189,7 @@ PRESETS: dict[str, dict[str, Any]] = {
         "logger_16bit": Acquisition(range=10.0, bits=16, anti_alias=0.4, anti_alias_order=6),
     },
 }
-INSTRUMENTS = PRESETS
+WHOLE_NUMBERS = ("bits", "anti_alias_order")
 SENSORS = ("accelerometer", "velocity_sensor", "displacement_sensor")
 
 Choice = str | Mapping[str, Any] | None
@@ -217,10 +218,16 @@ def instrument(
 
     Raises:
         UnknownNameError: no such preset.
-        LabError: no such setting, or a value that is no number.
+        LabError: no such setting, a value that is no number or out of its bounds, or settings that do not go together.
     """
+    if not (math.isfinite(noise_percent) and noise_percent >= 0):
+        raise LabError(f"noise_percent is {noise_percent}; expected a number from 0")
     chain = rig.chain
     cell = _chosen("force_sensor", force_sensor)
+    if cell is not None and cell.bandwidth:
+        raise LabError(
+            f"force_sensor has a bandwidth of {cell.bandwidth} Hz, but forces are recorded as means over samples; leave it out"
+        )
     source = _chosen("shaker", shaker)
     front = _chosen("acquisition", acquisition)
     for channel in rig.inputs:
@@ -228,9 +235,7 @@ def instrument(
             chain = chain.adding("actuators", *source.stages(channel.name))
         if cell is not None and channel.quantity == "force":
             signal, samples = cell.stages(channel.name)
-            # A load cell is read as samples: its roll-off lies far above any modal test.
-            own = tuple(stage for stage in signal if not stage.needs_substeps)
-            chain = replace(chain.adding("force_sensors", *own, *samples), force_measured=True)
+            chain = replace(chain.adding("force_sensors", *signal, *samples), force_measured=True)
     choices = dict(zip(SENSORS, (accelerometer, velocity_sensor, displacement_sensor), strict=True))
     by_quantity = {
         s.quantity: s for s in (_chosen(kind, choice) for kind, choice in choices.items()) if s is not None
@@ -260,6 +265,10 @@ def _acquired(
                 "an anti-alias filter follows the sample rate; give sample_rate, or set anti_alias to 0"
             )
         before.append(LowPass(channel, front.anti_alias * sample_rate, front.anti_alias_order))
+    if front.bits and not front.range:
+        raise LabError(
+            f"acquisition has {front.bits} bits and no range; give its range [V], or set bits to 0"
+        )
     if front.range:
         after.append(Saturation(channel, front.range / volts))
         if front.bits:
@@ -283,6 +292,11 @@ def _chosen(kind: str, choice: Choice) -> Any:
     for key, value in settings.items():
         if key not in allowed:
             raise LabError(f"{kind} has no setting {key!r}; expected preset, {', '.join(allowed)}")
-        if isinstance(value, bool) or not isinstance(value, int | float):
+        if isinstance(value, bool) or not isinstance(value, int | float) or not math.isfinite(value):
             raise LabError(f"{kind} setting {key} is {value!r}; expected a number")
-    return replace(base, **settings)
+        if key in WHOLE_NUMBERS and value != int(value):
+            raise LabError(f"{kind} setting {key} is {value!r}; expected a whole number")
+        # Only an error of a gain has a sign, and a sensitivity must tell volts from nothing.
+        if (value < 0 and not key.endswith("_error")) or (key == "sensitivity" and value == 0):
+            raise LabError(f"{kind} setting {key} is {value!r}; expected a positive number")
+    return replace(base, **{key: int(v) if key in WHOLE_NUMBERS else v for key, v in settings.items()})
