@@ -55,7 +55,18 @@ def resonance_peaks(recording: Recording) -> list[float]:
 
 
 def choose_orders(recording: Recording, n_peaks: int) -> tuple[list[int], str]:
-    """Orders to sweep, three times as many modes as there are resonance peaks, and the reason."""
+    """Orders to sweep, for three times as many modes as there are resonance peaks, and the reason.
+
+    Peaks hide modes that are close, heavily damped or weakly driven, which the factor allows for. Much
+    higher orders than needed only split the modes of the structure and multiply those of the noise.
+
+    Args:
+        recording: bounds the orders by its length.
+        n_peaks: how many peaks the spectra show.
+
+    Returns:
+        2, 4, … and one sentence.
+    """
     highest = min(max(6 * n_peaks, 20), MAX_ORDER)
     affordable = max(recording.n_samples // 20 * 2, 2)
     if affordable < highest:
@@ -69,7 +80,20 @@ def choose_orders(recording: Recording, n_peaks: int) -> tuple[list[int], str]:
 def choose_rows(
     recording: Recording, peaks: Sequence[float], order: int, n_references: int
 ) -> tuple[int, str]:
-    """Block rows for the slowest oscillation, the highest order and the length of the record; the reason."""
+    """Block rows for the slowest oscillation, the highest order and the length of the record, and the reason.
+
+    Args:
+        recording: bounds the rows by its length, since covariances at lags near it are mostly noise.
+        peaks: frequencies of the resonance peaks [Hz], rising.
+        order: the highest to be realized.
+        n_references: outputs in a block column.
+
+    Returns:
+        The number of block rows and one sentence.
+
+    Source: Reynders and De Roeck (2008), Mech. Syst. Signal Process. 22(3), who ask for half a period of the
+        lowest mode at least; two thirds did best in the trials above.
+    """
     longest = max(record.n_samples for record in recording.records)
     span = math.ceil(2 / 3 * recording.sample_rate / peaks[0]) if peaks else 0
     for_order = 2 + -(-3 * order // (2 * n_references))
