@@ -231,12 +231,12 @@ class _Bench:
         finest = FINEST if asked is not None else FINEST_UNASKED
         best = plan = self._measured(guess(accuracy), pilots, growth)
         in_vain = 0
-        # Rounding puts a floor under the error: two finer plans that are no better have met it.
+        # Rounding puts a floor under the error: two finer plans that are hardly better have met it.
         while best.error > accuracy and plan.substeps < finest and in_vain < 2:
             wanted = stepping.finer(self.rig, plan, accuracy)
             wanted = stepping.aligned(replace(wanted, substeps=min(wanted.substeps, finest)), dt, delays)
             plan = self._measured(wanted, pilots, growth)
-            in_vain = 0 if plan.error < best.error else in_vain + 1
+            in_vain = 0 if plan.error < best.error / 2 else in_vain + 1
             best = min(best, plan, key=lambda each: each.error)
         if best.error > accuracy and asked is not None:
             raise LabError(

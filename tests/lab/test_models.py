@@ -105,10 +105,11 @@ def test_spatial_truss_linearizes_to_the_linear_one():
 def geometric_differences():
     """Largest displacement and relative difference of the two trusses under random forces of three sizes."""
     sizes = []
-    for rms in (1e-3, 1e-1, 10.0):
+    # Far below the difference of the two, and above the rounding of lengths.
+    for rms, accuracy in ((1e-3, 1e-8), (1e-1, 1e-9), (10.0, 1e-9)):
         both = [
             lab.simulate(
-                moving(name), Random(rms=rms), sample_rate=50.0, duration=3.0, seed=2, accuracy=1e-10
+                moving(name), Random(rms=rms), sample_rate=50.0, duration=3.0, seed=2, accuracy=accuracy
             )
             for name in ("truss", "truss_spatial")
         ]
@@ -134,11 +135,11 @@ def test_geometric_nonlinearity_grows_with_amplitude(geometric_differences):
     np.testing.assert_allclose(difference[2] / difference[1], q[2] / q[1], rtol=0.05)
 
 
-def test_generator_writes_the_models_that_are_here(tmp_path):
+@pytest.mark.parametrize("name", ["truss", "truss_spatial"])
+def test_generator_writes_the_models_that_are_here(name, tmp_path):
     shutil.copy(MODELS / "generate_truss.py", tmp_path)
     subprocess.run([sys.executable, str(tmp_path / "generate_truss.py")], check=True)
-    for name in ("truss.xml", "truss_spatial.xml"):
-        assert (tmp_path / name).read_text() == (MODELS / name).read_text()
+    assert (tmp_path / f"{name}.xml").read_text() == (MODELS / f"{name}.xml").read_text()
 
 
 @pytest.mark.parametrize("name", EVERY)
@@ -151,7 +152,7 @@ def test_models_can_be_drawn_and_carry_no_clutter(name):
     assert rig.name == name
 
 
-@pytest.mark.parametrize("name", EVERY)
+@pytest.mark.parametrize("name", [*LINEAR, "truss_spatial"])
 def test_every_degree_of_freedom_has_a_force_and_an_accelerometer(name):
     rig = model(name)
     assert {c.dof for c in rig.inputs} == set(rig.dofs)
@@ -171,16 +172,21 @@ def test_the_table_is_true(name):
     rig = model(name)
     modes = rig.modes()
     assert (int(springs), int(n_dofs)) == (len(rig.springs), len(rig.dofs))
-    # As many digits as are printed.
-    assert [f"{f:.4f}" for f in modes.frequency_hz] == frequencies.split(", ")
-    assert [f"{100 * z:.2f}" for z in modes.damping_ratio] == ratios.split(", ")
+    # As many digits as are printed, and as many modes, where a long list breaks off.
+    for cell, values in (
+        (frequencies, [f"{f:.4f}" for f in modes.frequency_hz]),
+        (ratios, [f"{100 * z:.2f}" for z in modes.damping_ratio]),
+    ):
+        *listed, last = cell.split(", ")
+        assert listed == values[: len(listed)]
+        assert last == "…" or [*listed, last] == values
 
 
 def test_the_table_lists_every_model():
     assert sorted(table()) == EVERY
 
 
-@pytest.mark.parametrize("name", EVERY)
+@pytest.mark.parametrize("name", [*LINEAR, "truss_spatial"])
 def test_the_text_names_channels_that_exist(name):
     text = (MODELS / "README.md").read_text("utf-8")
     section = next(part for part in text.split("\n## ")[1:] if name in part.splitlines()[0].split(", "))
