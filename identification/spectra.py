@@ -191,7 +191,7 @@ def frequency_response(
             that end before the structure rests. It shifts all poles by as much, which `plscf` undoes.
 
     Returns:
-        H at all lines where every input acts.
+        H at all lines above zero where every input acts.
 
     Raises:
         RecordingError: a sample is missing, inputs were not measured, or nowhere act independently.
@@ -213,8 +213,7 @@ def frequency_response(
     segments = choose_segments(recording, n_segment=n_segment, decay=decay)
     moments = _moments(recording, segments)
     use = excited(moments)
-    if segments.kind == "stationary":
-        use[:2] = False  # an offset, under the Hann window, reaches these two lines
+    use[: 2 if segments.kind == "stationary" else 1] = False  # what the offset of a sensor reaches
     if not use.any():
         raise RecordingError(
             f"the {len(recording.inputs)} inputs nowhere act independently in {segments.n_averages:.3g} pieces; "
@@ -225,7 +224,7 @@ def frequency_response(
     known = n > n_inputs + 0.5
     dropped = int(np.sum(~use))
     notes = segments.notes
-    if dropped > 2:
+    if dropped > 2:  # more than the offset
         notes = (*notes, f"{dropped} of {use.size} lines are left out, as an input is silent there.")
     return FrequencyResponse(
         np.flatnonzero(use) / (segments.length * recording.dt),
