@@ -15,7 +15,6 @@ import scipy.linalg
 import scipy.signal
 
 from identification.recording import Array, Channel
-from lab import kernel
 
 NO_OBSERVER = np.zeros((0, 0))
 
@@ -25,7 +24,7 @@ class Law:
     """A restoring force between degrees of freedom that depends on their extension along `row`.
 
     Attributes:
-        kind: one of the laws of `lab.kernel`.
+        kind: one of the laws of `lab.forces`.
         row: extension per displacement of each degree of freedom, shape (n_dofs,).
         parameters: up to three numbers.
     """
@@ -155,6 +154,9 @@ class Responder:
             measured: recorded outputs, for the observer.
             n_record: samples of the whole record, for drift; `n_samples` when None.
         """
+        # The compiler behind the kernel takes a second to load, and only responses need it.
+        from lab import kernel
+
         plant = self.plant
         u = _driven(
             plant,

@@ -10,7 +10,7 @@ import numpy as np
 
 from identification.recording import DERIVATIVE, Array
 from lab import chain as stages
-from lab import kernel, laws, linearize
+from lab import forces, laws, linearize
 from lab.errors import RigError
 from lab.plant import Law, Path, Plant, Tone, fresh_paths
 from lab.ports import is_law
@@ -205,9 +205,9 @@ def _spring_laws(rig: Rig, data: mujoco.MjData, spring: Spring, row: Array) -> l
                     f"tendon {spring.name!r} is under load at rest, outside its deadband; a plant cannot hold that"
                 )
             if high < FAR:
-                found.append(Law(kernel.STOP, row, (high - length, k, 1.0)))
+                found.append(Law(forces.STOP, row, (high - length, k, 1.0)))
             if low > -FAR:
-                found.append(Law(kernel.STOP, row, (low - length, k, -1.0)))
+                found.append(Law(forces.STOP, row, (low - length, k, -1.0)))
             if np.any(poly):
                 raise RigError(
                     f"tendon {spring.name!r} has a deadband and a polynomial; a plant cannot hold both"
@@ -218,19 +218,19 @@ def _spring_laws(rig: Rig, data: mujoco.MjData, spring: Spring, row: Array) -> l
             raise RigError(
                 f"spring {spring.name!r} is not linear and under load at rest; a plant cannot hold that"
             )
-        found.append(Law(kernel.CUBIC, row, (float(poly[1]), float(poly[0]))))
+        found.append(Law(forces.CUBIC, row, (float(poly[1]), float(poly[0]))))
     if np.any(drag):
-        found.append(Law(kernel.QUADRATIC, row, (float(drag[0]), float(drag[1]))))
+        found.append(Law(forces.QUADRATIC, row, (float(drag[0]), float(drag[1]))))
     return found
 
 
 def _frictions(rig: Rig, rows: Array) -> list[Law]:
     m, eye, found = rig.model, np.eye(len(rig.dofs)), []
     for dof in np.flatnonzero(m.dof_frictionloss):
-        found.append(Law(kernel.COULOMB, eye[dof], (float(m.dof_frictionloss[dof]), 0.0)))
+        found.append(Law(forces.COULOMB, eye[dof], (float(m.dof_frictionloss[dof]), 0.0)))
     for spring, row in zip(rig.springs, rows, strict=True):
         if spring.kind == "tendon" and m.tendon_frictionloss[spring.index]:
-            found.append(Law(kernel.COULOMB, row, (float(m.tendon_frictionloss[spring.index]), 0.0)))
+            found.append(Law(forces.COULOMB, row, (float(m.tendon_frictionloss[spring.index]), 0.0)))
     return found
 
 
@@ -240,9 +240,9 @@ def _user_laws(rig: Rig, rows: Array) -> list[Law]:
         kind, _, name = m.actuator(i).name.partition("@")
         row = rows[[spring.name for spring in rig.springs].index(name)]
         if kind == laws.HYSTERESIS:
-            found.append(Law(kernel.BOUC_WEN, row, tuple(float(x) for x in m.actuator_dynprm[i, :2])))
+            found.append(Law(forces.BOUC_WEN, row, tuple(float(x) for x in m.actuator_dynprm[i, :2])))
         else:
-            found.append(Law(kernel.DRIFT, row, (float(m.actuator_biasprm[i, 0]),)))
+            found.append(Law(forces.DRIFT, row, (float(m.actuator_biasprm[i, 0]),)))
     return found
 
 

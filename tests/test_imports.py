@@ -55,3 +55,8 @@ def test_public_names_of_the_lab_resolve():
 def test_functions_are_not_hidden_by_modules_of_the_same_name():
     code = "import lab.simulate, lab.compare; assert callable(lab.simulate) and callable(lab.compare)"
     subprocess.run([sys.executable, "-c", code], check=True)
+
+
+def test_the_compiler_comes_with_responses_only():
+    code = "import sys, lab.cli, lab.run, lab.effects, lab.catalogue; assert 'numba' not in sys.modules"
+    subprocess.run([sys.executable, "-c", code], check=True)

@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import ClassVar
 
-from lab import kernel
+from lab import forces
 from lab.effects.edits import law_of
 from lab.effects.effect import AtSpring, Effect
 from lab.effects.one_sided import one_sided
@@ -35,7 +35,7 @@ class BilinearStiffness(AtSpring, Effect):
 
     def explain(self, plant: Plant, survey: Survey) -> Plant:
         change = plant.spring_stiffness[survey.spring(self.location)] * self.relative_change_in_extension
-        return plant.with_law(kernel.BILINEAR, survey.row(self.location), change)
+        return plant.with_law(forces.BILINEAR, survey.row(self.location), change)
 
     @classmethod
     def guesses(cls, survey: Survey, location: str) -> list[Guess]:

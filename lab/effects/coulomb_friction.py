@@ -6,7 +6,7 @@ import xml.etree.ElementTree as ET
 from dataclasses import dataclass
 from typing import ClassVar
 
-from lab import kernel
+from lab import forces
 from lab.effects.edits import joint_element, spring_element
 from lab.effects.effect import Effect
 from lab.effects.survey import Guess, Survey
@@ -47,7 +47,7 @@ class CoulombFriction(Effect):
         return rig.edited(edit)
 
     def explain(self, plant: Plant, survey: Survey) -> Plant:
-        return plant.with_law(kernel.COULOMB, survey.row(self.location), self.force, 0.0)
+        return plant.with_law(forces.COULOMB, survey.row(self.location), self.force, 0.0)
 
     @classmethod
     def guesses(cls, survey: Survey, location: str) -> list[Guess]:

@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import ClassVar
 
-from lab import kernel
+from lab import forces
 from lab.effects.edits import law_of, with_law
 from lab.effects.effect import AtSpring, Effect
 from lab.effects.survey import Guess, Survey
@@ -30,7 +30,7 @@ class CubicStiffness(AtSpring, Effect):
         return with_law(rig, self.location, stiffness=[k, k2, k3 + self.k3])
 
     def explain(self, plant: Plant, survey: Survey) -> Plant:
-        return plant.with_law(kernel.CUBIC, survey.row(self.location), self.k3, 0.0)
+        return plant.with_law(forces.CUBIC, survey.row(self.location), self.k3, 0.0)
 
     @classmethod
     def guesses(cls, survey: Survey, location: str) -> list[Guess]:

@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import ClassVar
 
-from lab import kernel
+from lab import forces
 from lab.effects.edits import copy_of, law_of, numbers, with_law, with_tendon
 from lab.effects.effect import AtSpring, Effect
 from lab.effects.survey import Guess, Survey
@@ -39,7 +39,7 @@ class Freeplay(AtSpring, Effect):
 
     def explain(self, plant: Plant, survey: Survey) -> Plant:
         k = plant.spring_stiffness[survey.spring(self.location)]
-        return plant.with_law(kernel.DEADBAND, survey.row(self.location), self.half_gap, k)
+        return plant.with_law(forces.DEADBAND, survey.row(self.location), self.half_gap, k)
 
     @classmethod
     def guesses(cls, survey: Survey, location: str) -> list[Guess]:

@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import ClassVar
 
-from lab import kernel
+from lab import forces
 from lab.effects.effect import AtSpring, Effect
 from lab.effects.one_sided import one_sided
 from lab.effects.survey import Guess, Survey
@@ -36,7 +36,7 @@ class GapContact(AtSpring, Effect):
 
     def explain(self, plant: Plant, survey: Survey) -> Plant:
         side = 1.0 if self.gap >= 0 else -1.0
-        return plant.with_law(kernel.STOP, survey.row(self.location), self.gap, self.contact_stiffness, side)
+        return plant.with_law(forces.STOP, survey.row(self.location), self.gap, self.contact_stiffness, side)
 
     @classmethod
     def guesses(cls, survey: Survey, location: str) -> list[Guess]:

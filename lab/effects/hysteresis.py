@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import ClassVar
 
-from lab import kernel, laws
+from lab import forces, laws
 from lab.effects.effect import AtSpring, Effect
 from lab.effects.survey import Guess, Survey
 from lab.plant import Plant
@@ -35,7 +35,7 @@ class Hysteresis(AtSpring, Effect):
 
     def explain(self, plant: Plant, survey: Survey) -> Plant:
         law = self.stiffness, self.yield_displacement
-        return plant.with_law(kernel.BOUC_WEN, survey.row(self.location), *law)
+        return plant.with_law(forces.BOUC_WEN, survey.row(self.location), *law)
 
     @classmethod
     def guesses(cls, survey: Survey, location: str) -> list[Guess]:

@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import ClassVar
 
-from lab import kernel, laws
+from lab import forces, laws
 from lab.effects.edits import law_of
 from lab.effects.effect import AtSpring, Effect
 from lab.effects.survey import Guess, Survey
@@ -32,7 +32,7 @@ class StiffnessDrift(AtSpring, Effect):
 
     def explain(self, plant: Plant, survey: Survey) -> Plant:
         change = plant.spring_stiffness[survey.spring(self.location)] * self.relative_change_over_record
-        return plant.with_law(kernel.DRIFT, survey.row(self.location), change)
+        return plant.with_law(forces.DRIFT, survey.row(self.location), change)
 
     @classmethod
     def guesses(cls, survey: Survey, location: str) -> list[Guess]:
