@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from identification.clusters import Poles, Thresholds, difference
-from identification.errors import NotSecondOrderError
+from identification.errors import IdentificationError, NotSecondOrderError
 from identification.layout import layout
 from identification.methods import find_method
 from identification.modes import Modes
@@ -18,6 +18,7 @@ from identification.recording import Recording
 from identification.second_order import second_order
 from identification.stability import Stabilization, stabilize
 from identification.systems import Realization, SecondOrder
+from identification.uncertainty import Placed, matrices_with_error_bars, modes_with_error_bars
 
 
 @dataclass(frozen=True, eq=False)
@@ -50,6 +51,7 @@ def identify(
     *,
     order: int | None = None,
     dofs: Sequence[str] | None = None,
+    uncertainty: bool = True,
     **settings: Any,
 ) -> Identification:
     """Modes of the structure behind a recording, and M, C and K where its channels allow.
@@ -60,6 +62,8 @@ def identify(
         order: number of states; None sweeps the order and keeps the modes that stay put, or takes the rank of
             the data when they are free of noise.
         dofs: names of the degrees of freedom of M, C and K in the order wanted.
+        uncertainty: whether to find the standard deviations of modes and matrices too, which costs about as much
+            again as the estimates.
         **settings: further settings of the method.
 
     Raises:
@@ -73,14 +77,17 @@ def identify(
     notes = (f"The method is {name}, {reason}.", *realization.notes)
     stabilization = stabilize(realization) if len(realization.systems) > 1 else None
     if stabilization is None or chosen.finds_order or order is not None:
-        modes = realization.system.modes().normalized()
+        modes, places = realization.system.modes().normalized(), None
         stable = _stays_put(modes, stabilization)
     else:
-        modes = stabilization.modes
+        modes, places = stabilization.modes, first_settled(stabilization)
         stable = (True,) * len(modes)
         realization, note = _lowest_complete(realization, stabilization)
         notes += note
     matrices, verdict = _matrices(realization, dofs)
+    if uncertainty:
+        modes, matrices, missing = _error_bars(recording, realization, modes, matrices, places, settings)
+        notes += missing
     warnings = (
         *_order_warnings(realization, modes),
         *(horizon_warning(modes, realization) if name == "ssi_cov" else ()),
@@ -139,6 +146,44 @@ def _matrices(
         return second_order(system, dofs=dofs), ()
     except NotSecondOrderError as error:
         return None, (f"Mass, damping and stiffness are left out: {error}.",)
+
+
+def first_settled(stabilization: Stabilization) -> list[Placed]:
+    """Where each mode stands at the lowest order at which it has settled.
+
+    At higher orders poles of the noise come close to it, and to first order nothing is known of their effect.
+    """
+    places = []
+    for k in range(len(stabilization.modes)):
+        i = int(np.flatnonzero(stabilization.cluster == k)[0])
+        omega, zeta = 2 * np.pi * stabilization.frequency_hz[i], stabilization.damping_ratio[i]
+        places.append(
+            Placed(int(stabilization.orders[i]), complex(omega * (-zeta + 1j * np.sqrt(1 - zeta**2))))
+        )
+    return places
+
+
+def _error_bars(
+    recording: Recording,
+    realization: Realization,
+    modes: Modes,
+    matrices: SecondOrder | None,
+    places: list[Placed] | None,
+    settings: dict[str, Any],
+) -> tuple[Modes, SecondOrder | None, tuple[str, ...]]:
+    """Modes and matrices with their standard deviations, or the reasons why they have none."""
+    notes = []
+    try:
+        modes = modes_with_error_bars(recording, realization, modes, places=places, settings=settings)
+    except IdentificationError as error:
+        notes.append(f"The modes have no error bars: {error}.")
+    if matrices is not None:
+        try:
+            order = 2 * len(matrices.dofs)
+            matrices = matrices_with_error_bars(recording, realization, matrices, order)
+        except IdentificationError as error:
+            notes.append(f"Mass, damping and stiffness have no error bars: {error}.")
+    return modes, matrices, tuple(notes)
 
 
 def _order_warnings(realization: Realization, modes: Modes) -> tuple[str, ...]:

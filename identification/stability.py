@@ -56,8 +56,10 @@ class Stabilization:
         shapes: of length one, shape (n_outputs, n_poles).
         label: "stable", or the rule of `RULES` that rejected the pole.
         cluster: position of the pole's mode in `modes`, -1 for none, shape (n_poles,).
-        modes: mean of each cluster, sorted by frequency. The standard deviations are the scatter over the
-            orders: they tell how well the data define a mode, not how far it may be from the truth.
+        modes: mean of each cluster, sorted by frequency.
+        frequency_scatter: standard deviation over the orders [Hz], shape (n_modes,). It tells how much the choice
+            of the order matters, not how far a mode may be from the truth.
+        damping_scatter: likewise of the damping ratio, shape (n_modes,).
     """
 
     orders: Indices
@@ -67,9 +69,11 @@ class Stabilization:
     label: tuple[str, ...]
     cluster: Indices
     modes: Modes
+    frequency_scatter: Array
+    damping_scatter: Array
 
     def __post_init__(self) -> None:
-        for name in ("frequency_hz", "damping_ratio"):
+        for name in ("frequency_hz", "damping_ratio", "frequency_scatter", "damping_scatter"):
             object.__setattr__(self, name, frozen(getattr(self, name)))
         for name in ("orders", "shapes", "cluster"):
             array = np.array(getattr(self, name))
@@ -108,10 +112,15 @@ def stabilize(realization: Realization, **thresholds: float) -> Stabilization:
         mean.damping_ratio,
         mean.shapes,
         realization.systems[0].outputs,
+    )
+    return Stabilization(
+        *poles,
+        tuple(NAMES[k] for k in rule),
+        cluster,
+        modes.normalized(),
         cluster_scatter(poles.frequency_hz, cluster),
         cluster_scatter(poles.damping_ratio, cluster),
     )
-    return Stabilization(*poles, tuple(NAMES[k] for k in rule), cluster, modes.normalized())
 
 
 def _sorted_means(poles: Poles, cluster: Indices) -> tuple[Indices, Poles]:

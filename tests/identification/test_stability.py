@@ -125,11 +125,12 @@ def test_modes_are_means_with_the_scatter_over_the_orders():
     zeta = 0.02 * (1 + 0.01 * rng.standard_normal(12))
     turned = [np.array(SHAPE) * np.exp(1j * rng.uniform(0, 2 * np.pi)) for _ in range(12)]
     models = realized(*([(f[i], zeta[i], turned[i]), *fillers(i)] for i in range(12)))
-    modes = stabilize(models).modes
+    found = stabilize(models)
+    modes = found.modes
     np.testing.assert_allclose(modes.frequency_hz, [np.mean(f[1:])], rtol=1e-10)
-    np.testing.assert_allclose(modes.frequency_std, [np.std(f[1:], ddof=1)], rtol=1e-6)
+    np.testing.assert_allclose(found.frequency_scatter, [np.std(f[1:], ddof=1)], rtol=1e-6)
     np.testing.assert_allclose(modes.damping_ratio, [np.mean(zeta[1:])], rtol=1e-8)
-    np.testing.assert_allclose(modes.damping_std, [np.std(zeta[1:], ddof=1)], rtol=1e-6)
+    np.testing.assert_allclose(found.damping_scatter, [np.std(zeta[1:], ddof=1)], rtol=1e-6)
     # Phases are aligned before the mean, so that shapes do not cancel; the largest part is one.
     np.testing.assert_allclose(modes.shapes[:, 0], np.array(SHAPE) / 2, atol=1e-9)
 

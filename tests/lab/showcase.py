@@ -131,4 +131,6 @@ def stabilization(system: StateSpace, modes: Modes, seed: int = 9) -> Stabilizat
         tuple(label),
         np.array(cluster),
         modes,
+        1e-3 * modes.frequency_hz,
+        np.zeros(len(modes)),
     )

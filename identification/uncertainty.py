@@ -1,0 +1,200 @@
+"""Error bars: how far modes and matrices may be from the truth, one standard deviation, for every method.
+
+- `era`: the residual's noise, to first order through the Hankel matrix (`pulse_scatter`).
+- `okid_era`: the residual's noise through the observer's regression (`observer_scatter`).
+- `ssi_cov`: the record's own randomness, as the mean of a series in time (`covariance_scatter`).
+- any other method on stationary records: parts left out in turn (`resampling`).
+
+Over repeated tests the truth lies within ±2 of them about 95 % of the time, as long as the method itself has no
+bias to speak of. Without noise they are zero or of the size of rounding. The scatter of a mode over model
+orders is something else and tells nothing about its error.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
+from typing import Any, NamedTuple
+
+import numpy as np
+import scipy.linalg
+
+from identification.covariance_scatter import covariance_scatter
+from identification.error_bars import modes_with_std
+from identification.errors import IdentificationError
+from identification.methods import find_method
+from identification.modes import Modes
+from identification.observer_scatter import observer_tangent
+from identification.parameterizations import Tangent
+from identification.pulse_scatter import pulse_tangent
+from identification.recording import Array, Recording
+from identification.resampling import jackknife_std
+from identification.second_order import second_order
+from identification.systems import Realization, SecondOrder
+
+STEP = 1e-6
+"""Relative step of a difference quotient."""
+
+
+class Placed(NamedTuple):
+    """Where a mode stands among the models: at an order, with a continuous-time pole [rad/s]."""
+
+    order: int
+    pole: complex
+
+
+def modes_with_error_bars(
+    recording: Recording,
+    realization: Realization,
+    modes: Modes,
+    *,
+    places: Sequence[Placed] | None = None,
+    settings: Mapping[str, Any] | None = None,
+) -> Modes:
+    """The modes with the standard deviations of their frequencies and damping ratios.
+
+    Args:
+        recording: the one that was realized.
+        realization: by any method of `METHODS`.
+        modes: those found.
+        places: where each of them stands; at the realization's own order when None.
+        settings: further settings that the method was given.
+
+    Returns:
+        The same modes; a standard deviation is infinite where a part of the data left out loses the mode.
+
+    Raises:
+        TooShortError: too few data to tell.
+        IdentificationError: the records or the model allow no error bars; says why.
+
+    Source: as for `pulse_tangent`, `observer_tangent`, `covariance_scatter` and `jackknife_std`.
+    """
+    if places is None:
+        places = [Placed(realization.order, complex(pole)) for pole in modes.poles]
+    if not places:
+        return modes
+    given = dict(settings or {})
+    if realization.method == "ssi_cov":
+        std = covariance_scatter(recording, realization, places, references=given.get("references"))
+    elif realization.method in ("era", "okid_era"):
+        std = _from_tangents(recording, realization, places)
+    else:
+        std = _from_parts(recording, realization, places, given)
+    return replace(modes, frequency_std=std[0], damping_std=std[1])
+
+
+def matrices_with_error_bars(
+    recording: Recording, realization: Realization, matrices: SecondOrder, order: int
+) -> SecondOrder:
+    """M, C_d and K with the standard deviation of each entry.
+
+    Args:
+        recording: the one that was realized.
+        realization: by `era` or `okid_era`.
+        matrices: those of its model of the given order.
+        order: number of states.
+
+    Raises:
+        TooShortError: too few data to tell.
+        IdentificationError: the method or the model allows no error bars; says why.
+
+    Source: as for `pulse_tangent` and `observer_tangent`; the derivatives are central differences.
+    """
+    tangent = _tangent(recording, realization, order, inputs=True)
+    moves = [_matrix_move(direction, matrices.dofs) for direction in _directions(tangent)]
+    mass, damping, stiffness = (np.sqrt(np.sum(np.square(each), axis=0)) for each in zip(*moves, strict=True))
+    return replace(matrices, mass_std=mass, damping_std=damping, stiffness_std=stiffness)
+
+
+def _tangent(recording: Recording, realization: Realization, order: int, *, inputs: bool) -> Tangent:
+    if realization.method == "era":
+        return pulse_tangent(recording, realization, order)
+    if realization.method == "okid_era":
+        return observer_tangent(recording, realization, order, inputs=inputs)
+    raise IdentificationError(
+        f"models of {realization.method!r} have no error bars of M, C and K; take era or okid_era"
+    )
+
+
+def _from_tangents(
+    recording: Recording, realization: Realization, places: Sequence[Placed]
+) -> tuple[Array, Array]:
+    std = np.empty((2, len(places)))
+    for order in {place.order for place in places}:
+        tangent = _tangent(recording, realization, order, inputs=False)
+        found = modes_with_std(tangent, np.eye(len(tangent.A_theta)))
+        if found.frequency_std is None or found.damping_std is None:
+            raise IdentificationError(f"the model of order {order} has no modes; take another order")
+        for k in (k for k, place in enumerate(places) if place.order == order):
+            nearest = int(np.argmin(np.abs(found.poles - places[k].pole)))
+            std[:, k] = found.frequency_std[nearest], found.damping_std[nearest]
+    return std[0], std[1]
+
+
+def _from_parts(
+    recording: Recording, realization: Realization, places: Sequence[Placed], given: Mapping[str, Any]
+) -> tuple[Array, Array]:
+    """By leaving parts out, with the same horizon and the same orders."""
+    method = find_method(realization.method)
+    fixed = {name: value for name, value in realization.settings.items() if name in method.settings}
+    fixed |= {name: value for name, value in given.items() if name != "orders"}
+    orders = sorted({place.order for place in places})
+
+    def estimate(part: Recording) -> Array:
+        found = method(part, orders[-1], orders=orders, **fixed)
+        values = np.full((2, len(places)), np.nan)
+        for k, (order, pole) in enumerate(places):
+            modes = found.at(order).modes() if order in found.orders else None
+            if modes is None or not len(modes):
+                continue
+            nearest = int(np.argmin(np.abs(modes.poles - pole)))
+            if abs(modes.poles[nearest] - pole) < 0.2 * abs(pole):
+                values[:, k] = modes.frequency_hz[nearest], modes.damping_ratio[nearest]
+        return values.ravel()
+
+    std = jackknife_std(recording, estimate).reshape(2, -1)
+    return std[0], std[1]
+
+
+def _directions(tangent: Tangent) -> list[Tangent]:
+    """One tangent per direction; no more directions than the model has parameters, for the same covariance."""
+    names = ("A_theta", "B_theta", "C_theta", "D_theta")
+    shapes = [getattr(tangent, name).shape[1:] for name in names]
+    flat = np.hstack([getattr(tangent, name).reshape(len(tangent.A_theta), -1) for name in names])
+    if flat.shape[0] > flat.shape[1]:
+        flat = scipy.linalg.qr(flat, mode="r")[0][: flat.shape[1]]
+    cuts = np.cumsum([int(np.prod(shape)) for shape in shapes])[:-1]
+    rows = [np.split(row, cuts) for row in flat]
+    return [
+        Tangent(tangent.system, *(part.reshape(1, *shape) for part, shape in zip(row, shapes, strict=True)))
+        for row in rows
+    ]
+
+
+def _matrix_move(direction: Tangent, dofs: tuple[str, ...]) -> tuple[Array, Array, Array]:
+    """How M, C_d and K move along a direction."""
+    system = direction.system
+    steps = {name: getattr(direction, f"{name}_theta")[0] for name in "ABCD"}
+    size = max(
+        float(np.linalg.norm(step) / np.linalg.norm(getattr(system, name)))
+        for name, step in steps.items()
+        if np.any(getattr(system, name))
+    )
+    if size == 0:
+        zero = np.zeros((len(dofs), len(dofs)))
+        return zero, zero, zero
+    h = STEP / size
+    ahead, behind = (
+        second_order(
+            replace(
+                system, **{name: getattr(system, name) + sign * h * step for name, step in steps.items()}
+            ),
+            dofs=dofs,
+        )
+        for sign in (1, -1)
+    )
+    return (
+        (ahead.mass - behind.mass) / (2 * h),
+        (ahead.damping - behind.damping) / (2 * h),
+        (ahead.stiffness - behind.stiffness) / (2 * h),
+    )
