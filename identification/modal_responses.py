@@ -84,7 +84,7 @@ def spectrum(system: StateSpace) -> Spectrum | None:
     # In balanced coordinates the units of the states have no say in the condition number.
     balanced, (scale, _) = scipy.linalg.matrix_balance(system.A, permute=False, separate=True)
     poles, phi = scipy.linalg.eig(balanced)
-    if np.linalg.cond(phi) > ILL_CONDITIONED:
+    if system.n_states and np.linalg.cond(phi) > ILL_CONDITIONED:
         return None
     phi = scale[:, None] * phi
     own = np.flatnonzero(poles.imag >= 0)
@@ -152,7 +152,7 @@ def close_pairs(modes: Spectrum, system_dt: float, run: Run) -> Pairs:
             a.append(i)
             b.append(j)
             twice.append(1.0 if [i, j] == conjugate else 2.0)
-    return Pairs(near, np.array(a), np.array(b), np.array(twice))
+    return Pairs(near, np.array(a, dtype=np.intp), np.array(b, dtype=np.intp), np.array(twice))
 
 
 def _signals(

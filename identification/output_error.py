@@ -57,7 +57,7 @@ class OutputError:
 
     def initial(self, q: Array) -> list[Array | None]:
         """The initial state of each record, None for rest."""
-        states = iter(q[self.n_theta :].reshape(-1, self.n_states))
+        states = iter(q[self.n_theta :].reshape(sum(self.released), self.n_states))
         return [next(states) if released else None for released in self.released]
 
     def tangent(self, q: Array) -> Tangent:
@@ -74,7 +74,7 @@ class OutputError:
         poles = np.linalg.eigvals(system.A)
         size = np.maximum(np.abs(poles), np.finfo(float).tiny)
         rate = np.log(size) if system.dt else poles.real * self.runs[0].dt
-        return float(np.max(rate) * np.max(self.n_samples))
+        return float(np.max(rate, initial=-np.inf) * np.max(self.n_samples))
 
     def squares(self, q: Array) -> Array:
         """Sum of squared errors of each record and output, (n_records, n_outputs); infinite without a model."""
