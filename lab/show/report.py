@@ -1,29 +1,20 @@
-"""The report: verdict, the tables it rests on, figures, and what it takes to reproduce it, in one HTML file.
-
-The only place that imports jinja2. All that comes from data is escaped.
-"""
+"""The report: verdict, the tables it rests on, figures, and what it takes to reproduce it, in one HTML file."""
 
 from __future__ import annotations
 
 import hashlib
-import importlib.metadata
-import platform
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
-import jinja2
-from markupsafe import Markup
-
 from identification.recording import Recording
 from lab.result import Result
-from lab.show.figures import Drawing, draw, matrix_maps
+from lab.show.figures import draw, matrix_maps
+from lab.show.page import checksums, inline, surroundings, template
 from lab.show.signals import measured_inputs
 from lab.show.tables import MAX_PRINTED, criteria_rows, matrix_summary, matrix_tables, modes_table, same_dofs
 from lab.show.verdict import verdict
 
-PACKAGES = ("virtual-modal-lab", "mujoco", "numpy", "scipy", "h5py")
-"""What the numbers depend on."""
 BESIDE = ("recording.h5", "result.json")
 """Files of the same folder that the report vouches for."""
 
@@ -48,14 +39,14 @@ def write_report(
         facts: further facts to reproduce the result, by name.
     """
     path = Path(path)
-    page = _template().render(
+    page = template("report.html.jinja").render(
         title=result.title or "Modal test",
         about=_about(result, recording),
         verdict=verdict(result),
         criteria=criteria_rows(result),
         modes=modes_table(result),
         **_matrices(result),
-        figures=[_inline(drawing) for drawing in draw(result, recording)],
+        figures=[inline(drawing) for drawing in draw(result, recording)],
         notes=result.notes,
         warnings=result.warnings,
         command=command,
@@ -63,30 +54,6 @@ def write_report(
         facts=list(_all_facts(path, result, scenario_text, facts or {}).items()),
     )
     path.write_text(page, encoding="utf-8", newline="\n")
-
-
-def _template() -> jinja2.Template:
-    environment = jinja2.Environment(
-        loader=jinja2.FileSystemLoader(Path(__file__).parent),
-        autoescape=True,
-        trim_blocks=True,
-        lstrip_blocks=True,
-        undefined=jinja2.StrictUndefined,
-        finalize=_visible,
-    )
-    return environment.get_template("report.html.jinja")
-
-
-def _visible(value: Any) -> Any:
-    """Text without the characters that HTML forbids; markup of our own as it is."""
-    if isinstance(value, Markup) or not isinstance(value, str):
-        return value
-    return "".join(c if c.isprintable() or c in "\n\t" else "\N{REPLACEMENT CHARACTER}" for c in value)
-
-
-def _inline(drawing: Drawing) -> dict[str, Any]:
-    # The SVG is ours: its texts were escaped when it was written.
-    return {"name": drawing.name, "svg": Markup(drawing.svg), "caption": drawing.caption}
 
 
 def _about(result: Result, recording: Recording) -> str:
@@ -109,7 +76,7 @@ def _matrices(result: Result) -> dict[str, Any]:
     return {
         "matrices": matrix_tables(found, truth) if printed else [],
         "matrix_summary": matrix_summary(found, truth) if truth is not None else [],
-        "matrix_figure": None if printed else _inline(matrix_maps(found, truth)),
+        "matrix_figure": None if printed else inline(matrix_maps(found, truth)),
         "dofs": found.dofs,
     }
 
@@ -120,22 +87,8 @@ def _all_facts(path: Path, result: Result, scenario_text: str, facts: Mapping[st
     own = {"Method": f"{result.realization.method}, order {result.realization.order}"}
     if settings:
         own["Settings of the method"] = settings
-    own["Versions"] = ", ".join(_versions(PACKAGES))
-    own["Machine"] = f"{platform.system()} {platform.machine()}"
+    own |= surroundings()
     if scenario_text:
         own["SHA-256 of the scenario"] = hashlib.sha256(scenario_text.encode("utf-8", "replace")).hexdigest()
-    for name in BESIDE:
-        if (path.parent / name).is_file():
-            with (path.parent / name).open("rb") as file:
-                own[f"SHA-256 of {name}"] = hashlib.file_digest(file, "sha256").hexdigest()
+    own |= checksums(path.parent, BESIDE)
     return {**facts, **{name: value for name, value in own.items() if name not in facts}}
-
-
-def _versions(packages: Sequence[str]) -> list[str]:
-    versions = [f"Python {platform.python_version()}"]
-    for name in packages:
-        try:
-            versions.append(f"{name} {importlib.metadata.version(name)}")
-        except importlib.metadata.PackageNotFoundError:
-            versions.append(f"{name} not installed as a package")
-    return versions
