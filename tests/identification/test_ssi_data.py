@@ -1,11 +1,11 @@
 """SSI-data on data with and without noise, against a plain projection."""
 
+import importlib
 from dataclasses import replace
 
 import numpy as np
 import pytest
 
-from identification import ssi_data as module
 from identification.errors import RecordingError, TooShortError
 from identification.recording import Channel, Recording
 from identification.ssi import ssi_cov
@@ -48,7 +48,7 @@ def test_equals_the_projection_written_out():
 def test_the_size_of_blocks_changes_nothing_but_rounding(monkeypatch):
     recording = ambient(5_000, 3)
     whole = ssi_data(recording, order=14, n_rows=8).system.modes()
-    monkeypatch.setattr(module, "VALUES", 1)
+    monkeypatch.setattr(importlib.import_module("identification.ssi_data"), "VALUES", 1)
     parts = ssi_data(recording, order=14, n_rows=8).system.modes()
     np.testing.assert_allclose(parts.poles, whole.poles, rtol=1e-7)
 
