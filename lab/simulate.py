@@ -19,7 +19,7 @@ from lab.files.recording import RecordingWriter, load
 from lab.rig import Rig
 from lab.stepping import Plan, Stepper
 
-PILOT_SAMPLES, MOST_PILOT_SAMPLES = 512, 4096
+PILOT_SAMPLES, MOST_PILOT_SAMPLES = 256, 4096
 """Length of the trial runs on which the error is measured, and at most for lightly damped structures."""
 
 FINEST, FINEST_UNASKED = 4096, 256
@@ -262,9 +262,10 @@ class _Bench:
 
     def _error(self, plan: Plan, pilots: Sequence[Load]) -> float:
         """Largest difference to twice the substeps, relative to the largest value of its channel."""
+        plans = (plan, stepping.doubled(plan))
         coarse, fine = (
-            np.concatenate([part.outputs for part in self._with(p).batch(pilots, None)], axis=2)
-            for p in (plan, stepping.doubled(plan))
+            np.concatenate([part.outputs for part in parts], axis=2)
+            for parts in zip(*self._combined(pilots, plans), strict=True)
         )
         difference = np.max(np.abs(coarse - fine), axis=2)  # (n_batch, n_outputs)
         largest = np.max(np.abs(fine), axis=2)
@@ -294,21 +295,41 @@ class _Bench:
             for load_ in self.loads:
                 yield load_, ((part.applied[0], part.outputs[0]) for part in self.batch([load_], progress))
             return
-        parts = list(self.batch(self.loads, progress))
+        parts = [(part.applied, part.outputs) for part in self.batch(self.loads, progress)]
         for number, load_ in enumerate(self.loads):
-            yield load_, ((part.applied[number], part.outputs[number]) for part in parts)
+            yield load_, ((applied[number], outputs[number]) for applied, outputs in parts)
 
     def batch(self, loads: Sequence[Load], progress: Progress | None) -> Iterator[_Part]:
         """Records of equal length side by side, in stretches of at most `BLOCK` samples."""
+        for (part,) in self._combined(loads, (self.plan,)):
+            yield part
+            if progress is not None:
+                progress(part.outputs.shape[2] * len(loads))
+
+    def _combined(self, loads: Sequence[Load], plans: Sequence[Plan]) -> Iterator[list[_Part]]:
+        """What each of several plans makes of the loads; substeps that plans have in common are run once."""
+        counts = sorted({count for plan in plans for count in plan.runs}, reverse=True)
+        memoryless = not self.rig.chain.needs_substeps
+        sensors = [[_sensors(self.rig, 1 / self.sample_rate) for _ in loads] for _ in plans]
+        for stretch in self._runs(loads, counts):
+            done = []
+            for plan, rows in zip(plans, sensors, strict=True):
+                parts = [stretch[counts.index(count)] for count in plan.runs]
+                outputs = plan.combined([part.outputs for part in parts])
+                positions = plan.combined([part.positions for part in parts])
+                if memoryless:
+                    # Without memory between samples, sensors need not see the substeps.
+                    outputs = np.stack([_sensed(row, y) for row, y in zip(rows, outputs, strict=True)])
+                done.append(replace(parts[0], outputs=outputs, positions=positions))
+            yield done
+
+    def _runs(self, loads: Sequence[Load], counts: Sequence[int]) -> Iterator[list[_Part]]:
+        """The response with each number of substeps."""
         start = (np.stack([load.position for load in loads]), np.stack([load.velocity for load in loads]))
         dt = 1 / self.sample_rate
         duration = max(load.n_record for load in loads) * dt
         disturb = [self._disturbances(load) for load in loads]
-        runs = [
-            _Run(self.rig, Stepper(self.rig, dt, substeps, *start, duration), dt)
-            for substeps in self.plan.runs
-        ]
-        sensors = None if self.rig.chain.needs_substeps else [_sensors(self.rig, dt) for _ in loads]
+        runs = [_Run(self.rig, Stepper(self.rig, dt, count, *start, duration), dt) for count in counts]
         blocks = [load.blocks() for load in loads]
         done = 0
         while done < loads[0].n_samples:
@@ -319,21 +340,8 @@ class _Bench:
             if self.rig.chain.disturbances:
                 pushes = np.stack([_through(rows, np.zeros((len(rows), n))) for rows in disturb])
                 forces = pushes if forces is None else forces + pushes
-            parts = [run.respond(commands, forces) for run in runs]
-            part = replace(
-                parts[0],
-                outputs=self.plan.combined([part.outputs for part in parts]),
-                positions=self.plan.combined([part.positions for part in parts]),
-            )
-            if sensors is not None:
-                # Without memory between samples, sensors need not see the substeps.
-                pairs = zip(sensors, part.outputs, strict=True)
-                sensed = [_through(rows, np.stack([y, y, y], axis=1))[:, 2] for rows, y in pairs]
-                part = replace(part, outputs=np.stack(sensed))
-            yield part
+            yield [run.respond(commands, forces) for run in runs]
             done += n
-            if progress is not None:
-                progress(n * len(loads))
 
     def _disturbances(self, load: Load) -> list[list[Process]]:
         """Fresh stages of the unmeasured force on every degree of freedom during one load."""
@@ -463,6 +471,11 @@ def _sensors(rig: Rig, dt: float) -> list[list[Process]]:
     """Fresh sensor stages for every output of one record."""
     rng = np.random.default_rng(0)
     return [[s.start(dt, rng, 0.0) for s in rig.chain.for_channel("sensors", c.name)] for c in rig.outputs]
+
+
+def _sensed(processes: Sequence[Sequence[Process]], outputs: Array) -> Array:
+    """Samples of one record after sensors that do not look between them."""
+    return _through(processes, np.stack([outputs, outputs, outputs], axis=1))[:, 2]
 
 
 def _through(processes: Sequence[Sequence[Process]], signals: Array) -> Array:

@@ -147,6 +147,12 @@ class Stepper:
         model = copy.copy(rig.model)
         model.opt.timestep = dt / substeps
         model.opt.integrator = mujoco.mjtIntegrator.mjINT_RK4
+        # A solver that starts from what another copy or an earlier chunk left would make results depend on them.
+        model.opt.disableflags |= int(mujoco.mjtDisableBit.mjDSBL_WARMSTART)
+        # The exact filter is one of Euler's steps; for Runge and Kutta it is a filter like others.
+        model.actuator_dyntype[model.actuator_dyntype == int(mujoco.mjtDyn.mjDYN_FILTEREXACT)] = int(
+            mujoco.mjtDyn.mjDYN_FILTER
+        )
         laws.set_duration(model, duration)
         _stiffen_friction(model)
         self._model = model
