@@ -22,6 +22,7 @@ sys.path.insert(0, str(ROOT))
 from identification.identify import Identification, identify  # noqa: E402
 from identification.modes import Modes  # noqa: E402
 from identification.recording import Array, Record, Recording  # noqa: E402
+from identification.systems import SecondOrder  # noqa: E402
 from tests.ambient import ambient  # noqa: E402
 from tests.systems import (  # noqa: E402
     chain3,
@@ -44,6 +45,7 @@ class Case:
     make: Callable[[Generator], Recording]
     truth: Modes
     settings: dict[str, object]
+    matrices: SecondOrder | None = None
 
 
 @dataclass(frozen=True)
@@ -56,6 +58,8 @@ class Calibration:
         bias: mean error over the true spread.
         n_tests: in which all modes were found.
         seconds: median time of an identification.
+        matrix_ratio: as `ratio`, shape (3, n_dofs, n_dofs) for M, C_d and K; None where there are none.
+        matrix_coverage: likewise.
     """
 
     ratio: Array
@@ -63,6 +67,8 @@ class Calibration:
     bias: Array
     n_tests: int
     seconds: float
+    matrix_ratio: Array | None
+    matrix_coverage: Array | None
 
 
 def with_noise(recording: Recording, level: float, rng: Generator) -> Recording:
@@ -99,16 +105,18 @@ def wind(rng: Generator) -> Recording:
 CHAIN7 = instrumented(chain7(), sensors(chain7().dofs), ()).modes()
 CHAIN3 = paper_chain3().modes()
 CASES = {
-    "chain3 pulse era": Case(pulses, CHAIN3, {"method": "era", "order": 6}),
+    "chain3 pulse era": Case(pulses, CHAIN3, {"method": "era", "order": 6, "dofs": chain3().dofs}, chain3()),
     "chain3 free_decay era": Case(released, CHAIN3, {"method": "era", "order": 6}),
-    "chain3 random okid_era": Case(random_forces, CHAIN3, {"method": "okid_era", "order": 6}),
+    "chain3 random okid_era": Case(
+        random_forces, CHAIN3, {"method": "okid_era", "order": 6, "dofs": chain3().dofs}, chain3()
+    ),
     "chain7 ambient ssi_cov": Case(wind, CHAIN7, {"method": "ssi_cov"}),
 }
 
 
 def calibrate(case: Case, n_tests: int, *, seed: int = 0) -> Calibration:
     """Error bars of repeated tests beside what they claim to be."""
-    values, stds, seconds = [], [], []
+    values, stds, seconds, matrices = [], [], [], []
     for k in range(n_tests):
         recording = case.make(np.random.default_rng([seed, k]))
         start = time.perf_counter()
@@ -118,6 +126,8 @@ def calibrate(case: Case, n_tests: int, *, seed: int = 0) -> Calibration:
         if both is not None:
             values.append(both[0])
             stds.append(both[1])
+        if case.matrices is not None and found.second_order is not None:
+            matrices.append((_entries(found.second_order), _entries(found.second_order, "_std")))
     x, s = np.array(values), np.array(stds)
     truth = np.stack([case.truth.frequency_hz, case.truth.damping_ratio])
     spread = np.std(x, axis=0, ddof=1)
@@ -127,7 +137,23 @@ def calibrate(case: Case, n_tests: int, *, seed: int = 0) -> Calibration:
         (np.mean(x, axis=0) - truth) / spread,
         len(x),
         float(np.median(seconds)),
+        *_matrix_calibration(matrices, case.matrices),
     )
+
+
+def _entries(matrices: SecondOrder, suffix: str = "") -> Array:
+    """M, C_d and K, or their standard deviations, shape (3, n_dofs, n_dofs)."""
+    return np.stack([getattr(matrices, name + suffix) for name in ("mass", "damping", "stiffness")])
+
+
+def _matrix_calibration(
+    pairs: list[tuple[Array, Array]], truth: SecondOrder | None
+) -> tuple[Array, Array] | tuple[None, None]:
+    if truth is None:
+        return None, None
+    x, s = (np.array(each) for each in zip(*pairs, strict=True))
+    ratio = np.sqrt(np.mean(s**2, axis=0)) / np.std(x, axis=0, ddof=1)
+    return ratio, np.mean(np.abs(x - _entries(truth)) < 2 * s, axis=0)
 
 
 def _matched(found: Identification, truth: Modes) -> tuple[Array, Array] | None:
@@ -157,6 +183,11 @@ def main() -> None:
                 ("bias / spread", c.bias),
             ):
                 print(f"  {what:10}{label:14}" + "".join(f"{x:7.2f}" for x in figures[row]))
+        if c.matrix_ratio is not None and c.matrix_coverage is not None:
+            for row, what in enumerate(("mass", "damping", "stiffness")):
+                upper = np.triu_indices(c.matrix_ratio.shape[1])
+                for label, figures in (("std / spread", c.matrix_ratio), ("coverage", c.matrix_coverage)):
+                    print(f"  {what:10}{label:14}" + "".join(f"{x:7.2f}" for x in figures[row][upper]))
 
 
 if __name__ == "__main__":
