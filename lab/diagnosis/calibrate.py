@@ -12,7 +12,7 @@ from lab.diagnosis.fit import Fit, fit
 from lab.diagnosis.misfit import Misfit, Parameters
 from lab.diagnosis.observer import kalman_gain
 from lab.effects.survey import Survey
-from lab.plant import NO_OBSERVER, ready
+from lab.plant import Path, ready
 from lab.rig import Rig
 from lab.twin import Twin
 
@@ -50,7 +50,8 @@ def parameters_of(twin: Twin, widths: Mapping[str, float] | None = None) -> Para
     names = [f"mass {b}" for b in twin.bodies]
     names += [f"{group} {s}" for group in ("stiffness", "damping") for s in twin.springs]
     values = [given.get(name, given[name.split(" ")[0]]) for name in names]
-    return Parameters(tuple(names), np.array(values, dtype=float), len(twin.bodies), len(twin.springs))
+    sizes = len(twin.bodies), len(twin.springs)
+    return Parameters(tuple(names), np.array(values, dtype=float), *sizes, np.eye(len(names)))
 
 
 def calibrate(misfit: Misfit, rig: Rig, *, start: Array | None = None) -> Calibration:
@@ -87,9 +88,7 @@ def survey_of(
         velocity=np.vstack([zero, eye, zero]),
         acceleration=np.vstack([zero, zero, eye]),
         outputs=tuple(plant.outputs[:1]) * (3 * n),
-        output_paths=tuple(
-            type(plant.input_paths[0] if plant.input_paths else plant.output_paths[0])() for _ in range(3 * n)
-        ),
+        output_paths=(Path(),) * (3 * n),
         order=(),
     )
     responder = ready(probe, misfit.dt)
@@ -132,6 +131,3 @@ def tone_peaks(residual: Array, dt: float) -> tuple[list[tuple[float, ...]], tup
         return (float(frequency[int(np.argmax(height))]),)
 
     return [peak(row) for row in spectrum], peak(spectrum.mean(axis=0))
-
-
-__all__ = ["NO_OBSERVER", "Calibration", "calibrate", "parameters_of", "survey_of"]

@@ -3,15 +3,18 @@
 from __future__ import annotations
 
 import numpy as np
+import scipy.linalg
 
 from identification.recording import Array
 from lab.diagnosis.fit import Fit
 
-TOLERANCES = (0.03, 0.1, 0.3, 1.0, 3.0)
+SPREADS = np.geomspace(0.1, 6.0, 15)
 """Spreads of the model's errors that are compared, in widths of the prior: the data say how good the model is."""
+DOUBT = float(np.log(2))
+"""How far the stated widths may be off: a factor of two is one standard deviation."""
 
 
-def minus_two_log_evidence(fit: Fit, *, free: int | None = None) -> float:
+def minus_two_log_evidence(fit: Fit, *, free: Array | None = None) -> float:
     """-2 log evidence of a fit up to a constant, the spread of the model's errors estimated with it.
 
     Parameters of the model are integrated out by Laplace's method; the variables of causes, whose priors are vague, cost
@@ -19,28 +22,31 @@ def minus_two_log_evidence(fit: Fit, *, free: int | None = None) -> float:
 
     Args:
         fit: a converged fit.
-        free: a parameter of the model whose prior is lifted: "this one is wrong" without any refit, since a second
+        free: a direction among the parameters whose prior is lifted: "this one is wrong" without any refit, since a second
             factor beside the parameter would be degenerate with it.
     """
     n, total = fit.theta.size, fit.residual.size
-    information = _of_parameters(fit.information, n)
-    theta = fit.theta
+    information, theta, prior = _of_parameters(fit.information, n), fit.theta, fit.precision
+    lifted = [np.linalg.eigh(prior)[1][:, k] for k in np.flatnonzero(np.linalg.eigvalsh(prior) < 0.5)]
+    if free is not None:
+        lifted.append(free / np.linalg.norm(free))
+    loose = np.array(lifted).reshape(-1, n).T  # directions without a prior
+    held = scipy.linalg.null_space(loose.T) if loose.size else np.eye(n)
     best = np.inf
-    for spread in TOLERANCES:
-        precision = np.full(n, 1 / spread**2)
-        known = np.ones(n, dtype=bool)
-        if free is not None:
-            precision[free], known[free] = 1e-6, False
-        A = information + np.diag(precision)
-        d = np.linalg.solve(A, theta - precision * theta)
-        inner = A[np.ix_(known, known)]
-        if free is not None:
-            inner = inner - np.outer(A[known, free], A[free, known]) / A[free, free]
+    for spread in SPREADS:
+        precision = held @ held.T / spread**2
+        A = information + precision
+        d = np.linalg.lstsq(A, prior @ theta - precision @ theta, rcond=None)[0]
+        inner = held.T @ A @ held
+        if loose.size:
+            cross, own = held.T @ A @ loose, loose.T @ A @ loose
+            inner = inner - cross @ np.linalg.pinv(own, hermitian=True) @ cross.T
         # The local quadratic may not promise more than the prior made the fit pay.
-        change = max(d @ information @ d - 2 * theta @ d, -(theta @ theta))
-        occam = np.linalg.slogdet(inner)[1] - np.sum(np.log(precision[known]))
-        best = min(best, fit.deviance + change + precision @ (theta + d) ** 2 + occam)
-    variables = sum(max(cause.n, 1) for cause in fit.causes) + (free is not None)
+        change = max(d @ information @ d - 2 * d @ prior @ theta, -(theta @ prior @ theta))
+        occam = np.linalg.slogdet(inner)[1] + 2 * held.shape[1] * np.log(spread)
+        doubt = (np.log(spread) / DOUBT) ** 2
+        best = min(best, fit.deviance + change + (theta + d) @ precision @ (theta + d) + occam + doubt)
+    variables = sum(max(cause.n, 1) for cause in fit.causes) + loose.shape[1]
     return float(best + variables * np.log(total))
 
 

@@ -26,8 +26,9 @@ class Fit:
         theta: parameters of the model, in widths of the prior.
         causes: hypotheses at their fitted values.
         residual: measured less predicted, (n_outputs, n_total).
-        objective: -2 log posterior up to a constant: n log of every channel's residual power, plus θᵀθ.
+        objective: -2 log posterior up to a constant: n log of every channel's residual power, plus θᵀ P θ.
         information: Gauss-Newton information of all variables without the prior, (n, n).
+        precision: P, of the prior, (n_parameters, n_parameters).
     """
 
     theta: Array
@@ -35,19 +36,27 @@ class Fit:
     residual: Array
     objective: float
     information: Array
+    precision: Array
 
     @property
     def deviance(self) -> float:
         """-2 log likelihood, up to the same constant."""
-        return self.objective - float(self.theta @ self.theta)
+        return self.objective - float(self.theta @ self.precision @ self.theta)
+
+    @property
+    def covariance(self) -> Array:
+        """Of all fitted variables: parameters in widths of the prior, causes in units of their scale."""
+        total = self.information.copy()
+        total[: self.theta.size, : self.theta.size] += self.precision
+        return np.asarray(np.linalg.pinv(total, rcond=1e-14, hermitian=True), dtype=np.float64)
 
 
-def objective(residual: Array, theta: Array) -> float:
+def objective(residual: Array, theta: Array, precision: Array) -> float:
     """-2 log posterior with the noise of every channel at its most likely level."""
     power = np.mean(residual**2, axis=1)
     if not np.all(np.isfinite(power)):
         return np.inf
-    return float(residual.shape[1] * np.sum(np.log(np.maximum(power, 1e-300))) + theta @ theta)
+    return float(residual.shape[1] * np.sum(np.log(np.maximum(power, 1e-300))) + theta @ precision @ theta)
 
 
 def weights(residual: Array) -> Array:
@@ -130,10 +139,13 @@ def fit(
     theta = np.asarray(theta, dtype=float)
     n = theta.size
     e = misfit.residual(theta, causes, observer=observer, n_train=n_train)
-    f, damping, age = objective(e, theta), 1e-3, refresh
+    P = misfit.parameters.precision
+    f, damping, age = objective(e, theta, P), 1e-3, refresh
     slopes = np.zeros((0, *e.shape))
-    prior = np.concatenate([np.ones(n), np.zeros(sum(cause.n for cause in causes))])
-    information = np.zeros((prior.size, prior.size))
+    size = n + sum(cause.n for cause in causes)
+    prior = np.zeros((size, size))
+    prior[:n, :n] = P
+    information = np.zeros((size, size))
     for _ in range(iterations):
         if told is not None:
             told()
@@ -143,19 +155,19 @@ def fit(
         age += 1
         J = np.concatenate([slopes, cause_slopes(misfit, theta, causes, observer, e, n_train)])
         w = weights(e)
-        Jw = (J * w[:, None]).reshape(prior.size, -1)
+        Jw = (J * w[:, None]).reshape(size, -1)
         information = Jw @ Jw.T
-        H = information + np.diag(prior)
-        g = Jw @ (e * w[:, None]).ravel() + prior * np.concatenate([theta, np.zeros(prior.size - n)])
+        H = information + prior
+        g = Jw @ (e * w[:, None]).ravel() + prior[:, :n] @ theta
         if not (np.all(np.isfinite(H)) and np.all(np.isfinite(g))):
             break
         step = None
         for _ in range(6):
-            scaled = H + damping * np.diag(np.diag(H)) + 1e-12 * np.trace(H) * np.eye(prior.size)
+            scaled = H + damping * np.diag(np.diag(H)) + 1e-12 * np.trace(H) * np.eye(size)
             d = -np.linalg.solve(scaled, g)
             trial, trial_causes = theta + d[:n], moved_by(causes, d[n:])
             trial_e = misfit.residual(trial, trial_causes, observer=observer, n_train=n_train)
-            trial_f = objective(trial_e, trial)
+            trial_f = objective(trial_e, trial, P)
             if trial_f < f:
                 step = f - trial_f
                 break
@@ -170,4 +182,4 @@ def fit(
             if fresh:
                 break
             age = refresh
-    return Fit(theta, causes, e, f, information)
+    return Fit(theta, causes, e, f, information, P)

@@ -73,12 +73,15 @@ class Parameters:
     Attributes:
         names: of the parameters.
         widths: one standard deviation of the logarithm of each factor.
+        n_bodies, n_springs: masses come first, then stiffnesses, then dampings.
+        precision: of the prior, in widths: the identity, but for directions that were found to be wrong.
     """
 
     names: tuple[str, ...]
     widths: Array
     n_bodies: int
     n_springs: int
+    precision: Array
 
     @property
     def n(self) -> int:
@@ -90,6 +93,20 @@ class Parameters:
         factors = np.exp(np.clip(theta * self.widths, -3, 3))
         a, b = self.n_bodies, self.n_bodies + self.n_springs
         return factors[:a], factors[a:b], factors[b:]
+
+    def group(self, name: str) -> list[int]:
+        """Numbers of all masses, stiffnesses or dampings."""
+        return [i for i, each in enumerate(self.names) if each.partition(" ")[0] == name]
+
+    def lifted(self, direction: Array) -> Parameters:
+        """The parameters with their prior out of the way along a direction."""
+        v = direction / np.linalg.norm(direction)
+        held = np.eye(self.n) - np.outer(v, v)
+        return replace(self, precision=held @ self.precision @ held + LOOSE * np.outer(v, v))
+
+
+LOOSE = 1e-6
+"""Precision left in a direction whose prior is lifted."""
 
 
 @dataclass(frozen=True, eq=False)

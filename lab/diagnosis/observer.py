@@ -24,9 +24,8 @@ def kalman_gain(misfit: Misfit, theta: Array, force_share: float, *, noise_share
         return NO_OBSERVER
     plant = misfit.plant(theta)
     F, G, *_, C, D, _ = ready(_pushed_everywhere(plant), misfit.dt).matrices
-    own = len(plant.inputs)
-    G, D = G[:, own:], D[:, own:]
     n = plant.n_dofs
+    G, D = G[0, :, -n:], D[:, -n:]
     Q = np.diag((force_share * survey.force_rms) ** 2)
     R = np.diag((noise_share * survey.output_rms) ** 2)
     # Scaled states and outputs: displacements and accelerations differ by orders of magnitude.

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -13,7 +13,7 @@ from lab.diagnosis.evidence import minus_two_log_evidence
 from lab.diagnosis.fit import POOL, Fit, cause_slopes, fit, moved_by, objective, theta_slopes, weights
 from lab.diagnosis.misfit import Hypothesis, Misfit
 from lab.diagnosis.observer import kalman_gain
-from lab.effects.effect import Effect
+from lab.effects.effect import EVERYWHERE, Effect
 from lab.plant import NO_OBSERVER
 
 OWN_PARAMETERS = {"mass": "mass_change", "stiffness": "stiffness_change", "damping": "damping_change"}
@@ -30,14 +30,14 @@ class Candidate:
         location: where it sits.
         fit: with it.
         gain: 2 log evidence gained over the model without it.
-        parameter: number of the model's parameter that leaves its tolerance, for a change of what the model has already.
+        direction: among the model's parameters, for a change of what the model has already.
     """
 
     cause: str
     location: str
     fit: Fit
     gain: float
-    parameter: int | None = None
+    direction: Array | None = None
 
 
 @dataclass(frozen=True, eq=False)
@@ -76,20 +76,20 @@ def screen(
             cause_slopes(misfit, theta, present, observer, e, n_train),
         ]
     )
-    base = objective(e, theta)
+    P = misfit.parameters.precision
+    base = objective(e, theta, P)
     w = weights(e)
     J = (slopes * w[:, None]).reshape(slopes.shape[0], -1)
-    prior = np.concatenate([np.ones(theta.size), np.zeros(len(slopes) - theta.size)])
-    H = np.linalg.inv(
-        J @ J.T + np.diag(prior) + 1e-9 * np.trace(J @ J.T) / max(len(J), 1) * np.diag(1 - prior)
-    )
-    start = np.concatenate([theta, np.zeros(len(slopes) - theta.size)])
+    n, size = theta.size, len(slopes)
+    prior = np.zeros((size, size))
+    prior[:n, :n] = P
+    H = np.linalg.pinv(J @ J.T + prior, rcond=1e-13, hermitian=True)
 
     def projected(r: Array) -> tuple[Array, float]:
         """Residual less what the model's parameters can explain of it, and its objective."""
-        d = -H @ (J @ (r * w[:, None]).ravel() + prior * start)
+        d = -H @ (J @ (r * w[:, None]).ravel() + prior[:, :n] @ theta)
         left = r + np.tensordot(d, slopes, axes=1)
-        return left, objective(left, theta + d[: theta.size])
+        return left, objective(left, theta + d[:n], P)
 
     def score(hypothesis: Hypothesis) -> Screened:
         h = hypothesis
@@ -155,7 +155,7 @@ def search(
             picked.append(h)
             places.add(key)
     without = minus_two_log_evidence(present)
-    candidates = _wrong_parameters(misfit, present, without, effects)
+    candidates = wrong_parameters(misfit, present, without, effects)
     refits = [_refit(calibration, theta, causes, h) for h in picked]
     scored = [_candidate(f, without) for f in refits if f is not None]
     scored.sort(key=lambda c: -c.gain)
@@ -192,23 +192,21 @@ def _candidate(found: Fit, without: float) -> Candidate:
     return Candidate(last.kind.cause, last.location, found, without - minus_two_log_evidence(found))
 
 
-def _wrong_parameters(
+def wrong_parameters(
     misfit: Misfit, present: Fit, without: float, effects: Mapping[str, type[Effect]]
 ) -> list[Candidate]:
-    """Masses, stiffnesses and dampings of the model that leave their tolerance."""
-    found = []
-    for j, name in enumerate(misfit.parameters.names):
-        group, _, place = name.partition(" ")
-        if OWN_PARAMETERS[group] not in effects:
-            continue
-        gain = without - minus_two_log_evidence(present, free=j)
-        if gain > 0 or abs(present.theta[j]) > 1:
-            found.append(Candidate(OWN_PARAMETERS[group], place, present, gain, j))
+    """Masses, stiffnesses and dampings of the model that leave their tolerance, one by one and all together."""
+    found, eye = [], np.eye(misfit.parameters.n)
+    loose = np.linalg.eigh(misfit.parameters.precision)
+    loose_directions = loose[1][:, loose[0] < 0.5]
+    for group, cause in OWN_PARAMETERS.items():
+        members = misfit.parameters.group(group)
+        proposals = [(misfit.parameters.names[j].partition(" ")[2], eye[j]) for j in members]
+        proposals.append((EVERYWHERE, eye[members].sum(axis=0)))
+        for place, direction in proposals:
+            v = direction / np.linalg.norm(direction)
+            fresh = np.linalg.norm(v - loose_directions @ (loose_directions.T @ v)) > 0.5
+            if cause in effects and fresh and abs(v @ present.theta) > 0.5:
+                gain = without - minus_two_log_evidence(present, free=direction)
+                found.append(Candidate(cause, place, present, gain, direction))
     return found
-
-
-def lifted(misfit: Misfit, parameter: int) -> Misfit:
-    """The misfit with the prior of one parameter out of the way."""
-    widths = misfit.parameters.widths.copy()
-    widths[parameter] *= 1e3
-    return replace(misfit, parameters=replace(misfit.parameters, widths=widths))

@@ -1,0 +1,343 @@
+"""Diagnose: what a model gets wrong, why, the extended model, and the gain; the whole flow on one page."""
+
+from __future__ import annotations
+
+import itertools
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from identification.recording import Array, Recording
+from lab.diagnosis import words
+from lab.diagnosis.calibrate import Calibration, calibrate, parameters_of, survey_of
+from lab.diagnosis.evidence import minus_two_log_evidence
+from lab.diagnosis.fit import Fit, fit
+from lab.diagnosis.gain import errors_of, held_out_error, noise_floor, predictions_of
+from lab.diagnosis.misfit import Misfit
+from lab.diagnosis.outcome import (
+    CONSISTENT,
+    EXPLAINED,
+    UNEXPLAINED,
+    Alternative,
+    Calibrated,
+    Diagnosis,
+    Finding,
+    Quantity,
+)
+from lab.diagnosis.search import Candidate, search, wrong_parameters
+from lab.diagnosis.whiteness import Whiteness, whiteness
+from lab.effects import EFFECTS
+from lab.effects.damping_change import DampingChange
+from lab.effects.edits import law_of, with_law, with_mass
+from lab.effects.effect import EVERYWHERE, Effect
+from lab.effects.mass_change import MassChange
+from lab.effects.stiffness_change import StiffnessChange
+from lab.errors import LabError
+from lab.rig import Rig
+from lab.twin import twin
+
+MOST_FINDINGS = 4
+FINE_SUBSTEPS = 24
+"""Substeps of the last fits, where the numerics must not be mistaken for physics."""
+
+Progress = Callable[[str], None]
+
+
+@dataclass(frozen=True, eq=False)
+class State:
+    """How far a diagnosis has come.
+
+    Attributes:
+        calibration: model and data, and where the search for the next cause starts.
+        fit: parameters and causes so far.
+        accepted: causes so far.
+        origin: the calibration without any cause.
+        held_out: error on data kept aside, of the calibrated model and after each cause.
+    """
+
+    calibration: Calibration
+    fit: Fit
+    accepted: tuple[Candidate, ...]
+    origin: Fit
+    held_out: tuple[float, ...]
+
+    @property
+    def misfit(self) -> Misfit:
+        """Model and data."""
+        return self.calibration.misfit
+
+
+def diagnose(
+    recording: Recording,
+    rig: Rig,
+    *,
+    baseline: Recording | None = None,
+    widths: Mapping[str, float] | None = None,
+    effects: Mapping[str, type[Effect]] = EFFECTS,
+    progress: Progress | None = None,
+) -> Diagnosis:
+    """What the model gets wrong in this recording, and the model that does not.
+
+    Args:
+        recording: measured outputs and inputs.
+        rig: what the engineer believes; its channels must have the names of the recording's.
+        baseline: of the same rig in its known state; it calibrates the model first.
+        widths: prior standard deviations, relative, by group ("mass", "stiffness", "damping") or parameter.
+        effects: the causes that may be named.
+        progress: told what is being done.
+
+    Raises:
+        LabError: recording and model do not fit together, or the recording has no measured input.
+    """
+    tell = progress or (lambda what: None)
+    rig = _connected(rig, recording)
+    model = twin(rig)
+    misfit = Misfit.of(recording, model, parameters_of(model, widths))
+    start = None
+    if baseline is not None:
+        tell("calibrating on the baseline")
+        base = Misfit.of(_like(baseline, recording), model, misfit.parameters, share=1.0)
+        known = calibrate(base, rig).fit
+        # What the baseline taught is the new prior: its mean and its precision.
+        spread = np.sqrt(np.diag(known.covariance))
+        misfit, start = _tightened(misfit, spread), known.theta
+    tell("calibrating")
+    calibration = calibrate(misfit, rig, start=start)
+    found = calibration.fit
+    state = State(calibration, found, (), found, (held_out_error(calibration.misfit, found),))
+    inputs = np.concatenate(
+        [u[:, :n] for (u, _), n in zip(misfit.records, misfit.n_train, strict=True)], axis=1
+    )
+    first: list[Candidate] = []
+    left = whiteness(state.fit.residual, inputs)
+    while len(state.accepted) < MOST_FINDINGS:
+        tell("searching for causes" if not state.accepted else f"searching on, {len(state.accepted)} found")
+        candidates, screened = search(state.calibration, state.fit, effects)
+        first = first or candidates
+        threshold = evidence_threshold(len(screened))
+        if not candidates or candidates[0].gain < threshold:
+            break
+        state = _with(state, candidates[0], rig)
+        left = whiteness(_finely(state).fit.residual, inputs)
+        if left.passed and not any(c.gain > threshold for c in _still_wrong(state, effects)):
+            break
+    state = _finely(_without_idle(state))
+    left = whiteness(state.fit.residual, inputs)
+    return _outcome(state, recording, rig, first, left)
+
+
+def evidence_threshold(looks: int) -> float:
+    """2 log evidence that a cause must gain to be named when so many were looked at.
+
+    Each cause pays log n per variable already (Schwarz 1978); the largest of many chance gains is covered by their number
+    (Bonferroni), and a factor e⁵, decisive on Jeffreys' scale, is asked beyond.
+    """
+    return 2 * float(np.log(max(looks, 1))) + 10
+
+
+def _connected(rig: Rig, recording: Recording) -> Rig:
+    """The rig with the recording's channels."""
+    if not recording.inputs or not all(record.inputs.shape[0] for record in recording.records):
+        raise LabError("a record has no measured input; a diagnosis needs records with measured forces")
+    return rig.connected(
+        inputs=[channel.name for channel in recording.inputs],
+        outputs=[channel.name for channel in recording.outputs],
+    )
+
+
+def _like(baseline: Recording, recording: Recording) -> Recording:
+    """The baseline with the channels of the recording."""
+    if baseline.sample_rate != recording.sample_rate:
+        raise LabError(
+            f"the baseline was sampled at {baseline.sample_rate} Hz and the recording at {recording.sample_rate} Hz; expected "
+            "equal rates"
+        )
+    return baseline.select(
+        inputs=[channel.name for channel in recording.inputs],
+        outputs=[channel.name for channel in recording.outputs],
+    )
+
+
+def _tightened(misfit: Misfit, spread: Array) -> Misfit:
+    """The misfit with prior widths shrunk to what a baseline left open, never below a tenth of a percent."""
+    widths = np.maximum(misfit.parameters.widths * np.minimum(spread, 1.0), 1e-3)
+    return replace(misfit, parameters=replace(misfit.parameters, widths=widths))
+
+
+def _with(state: State, candidate: Candidate, rig: Rig) -> State:
+    """The state with one more cause accepted, everything refitted together."""
+    misfit, found = state.misfit, candidate.fit
+    if candidate.direction is not None:
+        misfit = replace(misfit, parameters=misfit.parameters.lifted(candidate.direction))
+    refit = fit(misfit, found.theta, found.causes, iterations=15, refresh=2, tolerance=0.1)
+    misfit = replace(misfit, survey=survey_of(misfit, rig, refit.theta, (), refit.residual))
+    calibration = Calibration(misfit, refit, refit, 0.0)
+    held_out = (*state.held_out, held_out_error(misfit, refit))
+    return State(calibration, refit, (*state.accepted, candidate), state.origin, held_out)
+
+
+def _finely(state: State) -> State:
+    """The state refitted with substeps so fine that numerics are not mistaken for physics."""
+    if not any(state.misfit.plant(state.fit.theta, state.fit.causes).laws):
+        return state
+    misfit = replace(state.misfit, substeps=FINE_SUBSTEPS)
+    refit = fit(misfit, state.fit.theta, state.fit.causes, iterations=3, tolerance=0.5)
+    return replace(state, fit=refit, calibration=replace(state.calibration, misfit=misfit))
+
+
+def _still_wrong(state: State, effects: Mapping[str, type[Effect]]) -> list[Candidate]:
+    """Parameters of the model that are out of tolerance with the causes so far in it."""
+    return wrong_parameters(state.misfit, state.fit, minus_two_log_evidence(state.fit), effects)
+
+
+def _without_idle(state: State) -> State:
+    """The state without causes whose evidence is gone now that others were found."""
+    if len(state.accepted) < 2:
+        return state
+    with_all = minus_two_log_evidence(state.fit)
+    for number, candidate in enumerate(state.accepted[:-1]):
+        if candidate.direction is not None:
+            continue
+        position = sum(c.direction is None for c in state.accepted[:number])
+        causes = tuple(c for i, c in enumerate(state.fit.causes) if i != position)
+        trial = fit(state.misfit, state.fit.theta, causes, iterations=10, refresh=1, tolerance=0.1)
+        if minus_two_log_evidence(trial) <= with_all:
+            kept = (*state.accepted[:number], *state.accepted[number + 1 :])
+            errors = (*state.held_out[: number + 1], *state.held_out[number + 2 :])
+            return _without_idle(replace(state, fit=trial, accepted=kept, held_out=errors))
+    return state
+
+
+def effects_of(state: State) -> list[tuple[Candidate, Effect, dict[str, Quantity]]]:
+    """The accepted causes at their fitted size, with error bars."""
+    found, used = [], 0
+    covariance, n = state.fit.covariance, state.fit.theta.size
+    offset = n
+    for candidate in state.accepted:
+        if candidate.direction is not None:
+            found.append((candidate, *_own_change(state, candidate, covariance)))
+            continue
+        cause = state.fit.causes[used]
+        used += 1
+        slopes = []
+        for j in range(cause.n):
+            step = np.zeros(cause.n)
+            step[j] = 1e-4
+            up, down = (
+                cause.at(cause.values + step).effect.parameters,
+                cause.at(cause.values - step).effect.parameters,
+            )
+            slopes.append([(up[name] - down[name]) / 2e-4 for name in up])
+        J = np.array(slopes).reshape(cause.n, -1)
+        own = covariance[offset : offset + cause.n, offset : offset + cause.n]
+        stds = np.sqrt(np.maximum(np.einsum("ja,jk,ka->a", J, own, J), 0.0))
+        effect = cause.effect
+        quantities = {
+            name: Quantity(float(value), float(std), effect.units[name])
+            for (name, value), std in zip(effect.parameters.items(), stds, strict=True)
+        }
+        offset += cause.n
+        found.append((candidate, effect, quantities))
+    return found
+
+
+def _own_change(state: State, candidate: Candidate, covariance: Array) -> tuple[Effect, dict[str, Quantity]]:
+    """A mass, stiffness or damping that left its tolerance, as an effect."""
+    assert candidate.direction is not None
+    parameters, theta = state.misfit.parameters, state.fit.theta
+    members = np.flatnonzero(candidate.direction)
+    logs = theta[members] * parameters.widths[members]
+    weights = np.full(members.size, 1 / members.size)
+    change = float(np.expm1(weights @ logs))
+    scale = weights * parameters.widths[members]
+    std = float((1 + change) * np.sqrt(scale @ covariance[np.ix_(members, members)] @ scale))
+    if candidate.cause == "mass_change" and candidate.location != EVERYWHERE:
+        mass = float(state.misfit.twin.body_mass[members[0]])
+        effect: Effect = MassChange(candidate.location, delta_mass=mass * change)
+        return effect, {"delta_mass": Quantity(mass * change, mass * std, "kg")}
+    kinds = {"mass_change": MassChange, "stiffness_change": StiffnessChange, "damping_change": DampingChange}
+    effect = kinds[candidate.cause](candidate.location, relative_change=change)
+    return effect, {"relative_change": Quantity(change, std, "1")}
+
+
+def _outcome(
+    state: State, recording: Recording, rig: Rig, first: Sequence[Candidate], left: Whiteness
+) -> Diagnosis:
+    causes = effects_of(state)
+    calibrated = calibrated_rig(state.misfit, state.origin.theta, rig)
+    extended = calibrated_rig(state.misfit, state.fit.theta, rig)
+    for candidate, effect, _ in causes:
+        if candidate.direction is None:
+            extended = effect.apply(extended)
+    floor = noise_floor(state.fit.residual, state.misfit.measured)
+    accuracy = max(0.1 * floor, 1e-6)
+    predictions = predictions_of(recording, state.misfit, (rig, calibrated, extended), accuracy=accuracy)
+    shares = _shares(state, floor)
+    findings = [
+        Finding(effect, quantities, 0.5 * candidate.gain, share, words.says(effect, quantities))
+        for (candidate, effect, quantities), share in zip(causes, shares, strict=True)
+    ]
+    verdict, warnings = (EXPLAINED if findings else CONSISTENT), []
+    if not left.passed:
+        verdict = UNEXPLAINED
+        warnings.append(words.left_over(left, recording))
+    return Diagnosis(
+        verdict,
+        tuple(sorted(findings, key=lambda f: -f.holdout_gain)),
+        _alternatives(first) if findings else (),
+        calibration_of(state),
+        errors_of(predictions, floor),
+        predictions,
+        rig,
+        extended,
+        tuple(warnings),
+    )
+
+
+def _shares(state: State, floor: float) -> list[float]:
+    """Share of the calibrated model's excess error on data kept aside that each cause removed, 0 to 1."""
+    errors = state.held_out
+    excess = max(errors[0] - floor, 1e-12)
+    return [float(np.clip((a - b) / excess, 0.0, 1.0)) for a, b in itertools.pairwise(errors)]
+
+
+def _alternatives(first: Sequence[Candidate]) -> tuple[Alternative, ...]:
+    """The next best explanations of the first finding."""
+    told = first[0]
+    return tuple(
+        Alternative(
+            c.cause, c.location, 0.5 * c.gain, words.advice(told.cause, c.cause, 0.5 * (told.gain - c.gain))
+        )
+        for c in first[1:6]
+        if c.gain > 0
+    )
+
+
+def calibration_of(state: State) -> dict[str, Calibrated]:
+    """Nominal and calibrated value of every parameter of the model, with the causes in it."""
+    misfit, n = state.misfit, state.fit.theta.size
+    model = misfit.twin
+    nominal = np.concatenate([model.body_mass, model.stiffness, model.damping])
+    widths = misfit.parameters.widths
+    factors = np.exp(state.fit.theta * widths)
+    stds = nominal * factors * widths * np.sqrt(np.diag(state.fit.covariance)[:n])
+    rows = zip(misfit.parameters.names, nominal, nominal * factors, stds, strict=True)
+    return {name: Calibrated(float(a), float(b), float(c)) for name, a, b, c in rows}
+
+
+def calibrated_rig(misfit: Misfit, theta: Array, rig: Rig) -> Rig:
+    """The rig with its masses, stiffnesses and dampings at the parameters `theta`."""
+    mass, stiffness, damping = misfit.parameters.factors(theta)
+    original = rig
+    for body, factor in zip(misfit.twin.bodies, mass, strict=True):
+        rig = with_mass(rig, body, float(factor))
+    for name, k, c in zip(misfit.twin.springs, stiffness, damping, strict=True):
+        elastic, viscous = law_of(original, original.spring(name))
+        rig = with_law(
+            rig,
+            name,
+            stiffness=[float(k) * elastic[0], *elastic[1:]],
+            damping=[float(c) * viscous[0], *viscous[1:]],
+        )
+    return rig

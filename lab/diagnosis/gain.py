@@ -1,0 +1,77 @@
+"""Gain: how much better the extended model predicts data that no fit has seen, simulated by MuJoCo."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from identification.recording import Array, Recording
+from lab.diagnosis.fit import Fit
+from lab.diagnosis.misfit import Misfit
+from lab.diagnosis.outcome import Errors, Prediction
+from lab.replay import replay
+from lab.rig import Rig
+
+PAST = 30
+"""Samples of its own past from which a residual is predicted, to tell noise from what is not noise."""
+
+
+def predictions_of(
+    recording: Recording, misfit: Misfit, rigs: Sequence[Rig], *, accuracy: float
+) -> tuple[Prediction, ...]:
+    """Measured outputs and those of nominal, calibrated and extended rig, record by record."""
+    simulated = [replay(rig, recording, accuracy=accuracy) for rig in rigs]
+    return tuple(
+        Prediction(measured, nominal, calibrated, extended, first)
+        for (_, measured), nominal, calibrated, extended, first in zip(
+            misfit.records, *simulated, misfit.n_train, strict=True
+        )
+    )
+
+
+def errors_of(predictions: Sequence[Prediction], floor: float) -> Errors:
+    """RMS error over RMS signal on the samples kept out of every fit, all outputs weighted alike."""
+
+    def error(name: str) -> float:
+        return relative_error(
+            [
+                (p.measured[:, p.first_held_out :], getattr(p, name)[:, p.first_held_out :])
+                for p in predictions
+            ]
+        )
+
+    return Errors(floor, error("nominal"), error("calibrated"), error("extended"))
+
+
+def relative_error(pairs: Sequence[tuple[Array, Array]]) -> float:
+    """RMS over channels of RMS error over RMS signal; missing samples left out."""
+    measured = np.concatenate([a for a, _ in pairs], axis=1)
+    predicted = np.concatenate([b for _, b in pairs], axis=1)
+    power = np.nanmean((measured - predicted) ** 2, axis=1)
+    signal = np.nanmean(measured**2, axis=1)
+    return float(np.sqrt(np.mean(power / np.where(signal > 0, signal, 1.0))))
+
+
+def held_out_error(misfit: Misfit, found: Fit) -> float:
+    """The same of a fit, by the fast twin."""
+    whole = tuple(y.shape[1] for _, y in misfit.records)
+    e = misfit.residual(found.theta, found.causes, n_train=whole)
+    pairs, first = [], 0
+    for (_, y), n in zip(misfit.records, misfit.n_train, strict=True):
+        part = e[:, first : first + y.shape[1]]
+        pairs.append((y[:, n:], y[:, n:] - part[:, n:]))
+        first += y.shape[1]
+    return relative_error(pairs)
+
+
+def noise_floor(residual: Array, measured: Array) -> float:
+    """Share of the signal that is noise: what of the residual cannot be predicted from its own past."""
+    shares = []
+    for e, y in zip(residual, measured, strict=True):
+        rows = np.lib.stride_tricks.sliding_window_view(e, PAST + 1)
+        weights = np.linalg.lstsq(rows[:, :PAST], rows[:, PAST], rcond=None)[0]
+        innovation = rows[:, PAST] - rows[:, :PAST] @ weights
+        power = innovation @ innovation / max(len(innovation) - PAST, 1)
+        shares.append(power / max(np.nanmean(y**2), 1e-300))
+    return float(np.sqrt(np.mean(shares)))

@@ -1,0 +1,69 @@
+"""Whiteness: whether a residual is noise, or something is left in it."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+import scipy.stats
+
+from identification.recording import Array
+
+LAGS = 40
+LEVEL = 1e-3
+"""Probability that white noise fails the test."""
+
+
+@dataclass(frozen=True)
+class Whiteness:
+    """Largest correlation of a residual with its own past and with the inputs, in standard deviations.
+
+    Attributes:
+        largest: of all correlations tested.
+        limit: that white noise stays below, but for a probability of `LEVEL`.
+        channel: output with the largest correlation.
+        lag: in samples.
+        with_input: number of the input it correlates with; None for its own past.
+    """
+
+    largest: float
+    limit: float
+    channel: int
+    lag: int
+    with_input: int | None
+
+    @property
+    def passed(self) -> bool:
+        """Whether the residual passes for noise."""
+        return self.largest <= self.limit
+
+
+def whiteness(residual: Array, inputs: Array) -> Whiteness:
+    """Test of a residual (n_outputs, n) against its own past and against the inputs (n_inputs, n).
+
+    Under white noise every correlation is Gaussian with variance 1 / n; the limit is that of the largest of all of them
+    (Ljung 1999, System Identification, 16.6; Bonferroni).
+    """
+    n = residual.shape[1]
+    e = _normalized(residual)
+    own = np.stack(
+        [np.sum(e[:, k:] * e[:, : n - k], axis=1) for k in range(1, LAGS + 1)]
+    )  # (n_lags, n_outputs)
+    driven = inputs[np.std(inputs, axis=1) > 0] if inputs.size else np.zeros((0, n))
+    u = _normalized(driven)
+    cross = np.array([[e[:, k:] @ row[: n - k] for k in range(LAGS)] for row in u]).reshape(len(u), LAGS, -1)
+    tests = own.size + cross.size
+    limit = float(scipy.stats.norm.isf(LEVEL / (2 * max(tests, 1))))
+    k, i = np.unravel_index(np.argmax(np.abs(own)), own.shape)
+    best = Whiteness(float(np.sqrt(n) * np.abs(own[k, i])), limit, int(i), int(k) + 1, None)
+    if cross.size:
+        j, k, i = np.unravel_index(np.argmax(np.abs(cross)), cross.shape)
+        size = float(np.sqrt(n) * np.abs(cross[j, k, i]))
+        if size > best.largest:
+            best = Whiteness(size, limit, int(i), int(k), int(j))
+    return best
+
+
+def _normalized(rows: Array) -> Array:
+    centred = rows - rows.mean(axis=1, keepdims=True)
+    return np.asarray(centred / np.maximum(np.linalg.norm(centred, axis=1, keepdims=True), 1e-300))

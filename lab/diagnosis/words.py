@@ -1,0 +1,66 @@
+"""Words: what was found, in sentences for an engineer."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+from identification.recording import Recording
+from lab.diagnosis.outcome import Quantity
+from lab.diagnosis.whiteness import Whiteness
+from lab.effects.effect import EVERYWHERE, Effect
+
+ALIKE = {
+    frozenset({"hysteresis", "coulomb_friction"}): "repeat the test at two other levels",
+    frozenset({"hysteresis", "quadratic_damping"}): "repeat the test at two other levels",
+    frozenset({"coulomb_friction", "quadratic_damping"}): "repeat the test at two other levels",
+    frozenset({"cubic_stiffness", "gap_contact"}): "repeat the test at a higher level",
+    frozenset(
+        {"bilinear_stiffness", "gap_contact"}
+    ): "repeat the test at a lower level: a gap opens up, a bilinear spring does not",
+    frozenset({"sensor_lag", "sensor_delay"}): "sample faster and excite a wider band",
+    frozenset({"actuator_lag", "actuator_delay"}): "sample faster and excite a wider band",
+    frozenset({"attached_oscillator", "mass_change"}): "excite a band beyond the oscillator's resonance",
+    frozenset({"sensor_gain", "mass_change"}): "calibrate the sensor, or weigh the body",
+    frozenset({"actuator_gain", "mass_change"}): "calibrate the load cell, or weigh one body",
+    frozenset({"actuator_gain", "stiffness_change"}): "calibrate the load cell, or weigh one body",
+    frozenset({"actuator_gain", "sensor_gain"}): "calibrate the load cell, or weigh one body",
+    frozenset(
+        {"actuator_gain"}
+    ): "calibrate one load cell: with several shakers only the ratio of their gains shows",
+    frozenset({"unmeasured_force", "line_hum"}): "listen to the channel with its sensor taken off",
+}
+"""Causes that look alike, and the measurement that tells them apart."""
+
+
+def says(effect: Effect, quantities: Mapping[str, Quantity]) -> str:
+    """One sentence: what is wrong, where, and how much."""
+    where = "everywhere" if effect.location == EVERYWHERE else f"at {effect.location.replace('|', ' and ')}"
+    kind = " ".join((type(effect).__doc__ or "").split("\n\n")[0].split()).rstrip(".")
+    sizes = ", ".join(
+        f"{name.replace('_', ' ')} = {q.value:.4g} ± {q.std:.2g}{'' if q.unit == '1' else ' ' + q.unit}"
+        for name, q in quantities.items()
+        if name != "phase"
+    )
+    named = f"{effect.cause.replace('_', ' ').capitalize()} {where}{': ' + sizes if sizes else ''}"
+    return f"{named} ({kind[:1].lower()}{kind[1:]})."
+
+
+def advice(told: str, other: str, gap: float) -> str:
+    """Which measurement tells two causes apart, when the data hardly do: evidence within e⁵ of each other."""
+    if gap > 5:
+        return ""
+    measurement = ALIKE.get(
+        frozenset({told, other}), "repeat the test with another input, level or one more sensor"
+    )
+    return f"these data cannot separate it from {told.replace('_', ' ')}: {measurement}"
+
+
+def left_over(left: Whiteness, recording: Recording) -> str:
+    """Where something is left that no cause in the catalogue explains."""
+    channel = recording.outputs[left.channel].name
+    time = left.lag / recording.sample_rate
+    source = "its own past" if left.with_input is None else f"input {left.with_input + 1}"
+    return (
+        f"something is left that no cause in the catalogue explains: the residual of {channel} correlates with {source} "
+        f"at a lag of {time:.4g} s, {left.largest:.1f} standard deviations where noise stays below {left.limit:.1f}"
+    )
