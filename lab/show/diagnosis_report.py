@@ -1,0 +1,70 @@
+"""The report of a diagnosis: verdict, findings, errors, figures, calibration, and what it takes to reproduce it."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from pathlib import Path
+
+from identification.recording import Recording
+from lab.diagnosis.outcome import Diagnosis
+from lab.show.figures.diagnosis import draw_diagnosis
+from lab.show.findings import (
+    alternative_table,
+    calibration_table,
+    error_table,
+    finding_table,
+    verdict_of,
+)
+from lab.show.page import checksums, inline, surroundings, template
+from lab.show.signals import measured_inputs
+
+BESIDE = ("diagnosis.json", "extended.xml")
+"""Files of the same folder that the report vouches for."""
+
+
+def write_diagnosis_report(
+    path: str | Path,
+    diagnosis: Diagnosis,
+    recording: Recording,
+    *,
+    command: str = "",
+    facts: Mapping[str, str] | None = None,
+) -> None:
+    """Writes one HTML file that needs no other; the same data give the same bytes.
+
+    Args:
+        path: file to come; diagnosis.json and extended.xml beside it are named with their checksums.
+        diagnosis: what was found.
+        recording: what it was found in, with the channels of the diagnosis.
+        command: how the lab was called.
+        facts: further facts to reproduce the diagnosis, by name.
+    """
+    path = Path(path)
+    own = {**surroundings(), **checksums(path.parent, BESIDE)}
+    page = template("diagnosis.html.jinja").render(
+        title=f"{recording.title or diagnosis.nominal.name}: diagnosis",
+        about=_about(diagnosis, recording),
+        verdict=verdict_of(diagnosis, recording),
+        findings=finding_table(diagnosis),
+        sentences=[finding.says for finding in diagnosis.findings],
+        alternatives=alternative_table(diagnosis),
+        errors=error_table(diagnosis),
+        calibration=calibration_table(diagnosis),
+        figures=[inline(drawing) for drawing in draw_diagnosis(diagnosis, recording)],
+        notes=(),
+        warnings=diagnosis.warnings,
+        command=command,
+        scenario_text="",
+        facts=list({**(facts or {}), **own}.items()),
+    )
+    path.write_text(page, encoding="utf-8", newline="\n")
+
+
+def _about(diagnosis: Diagnosis, recording: Recording) -> str:
+    rig, n = diagnosis.nominal, len(recording.records)
+    kinds = ", ".join(sorted({record.kind.replace("_", " ") for record in recording.records}))
+    return (
+        f"Model {rig.name} ({len(rig.dofs)} degrees of freedom, {len(rig.springs)} springs) held against {n} "
+        f"record{'s' if n > 1 else ''} ({kinds}) with {len(measured_inputs(recording))} inputs and "
+        f"{len(recording.outputs)} outputs, {recording.duration:g} s at {recording.sample_rate:g} Hz."
+    )
