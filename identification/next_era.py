@@ -13,7 +13,6 @@ import numpy as np
 
 from identification.covariance import output_covariances, reference_rows
 from identification.era import era
-from identification.errors import OrderError
 from identification.output_only import plan_hankel
 from identification.recording import Recording
 from identification.ssi import balance
@@ -88,6 +87,4 @@ def _steepest_drop(realization: Realization) -> int:
     """The order after which the singular values fall by the largest factor."""
     s = np.append(realization.singular_values, 0)
     n = np.array(realization.orders)
-    if s[0] == 0:
-        raise OrderError("all covariances are zero: the outputs do not move; check the channels")
     return int(n[np.argmax(s[n - 1] / np.maximum(s[n], np.finfo(float).eps * s[0]))])
