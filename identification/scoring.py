@@ -156,9 +156,10 @@ def maximize(problem: OutputError, noise: Noise, start: Array, *, max_iterations
         done = distance2 < TOLERANCE
         if done or iteration == max_iterations:
             break
-        better, damping = _improve(look, here, gradient, curvature, damping)
+        near = distance2 < GOOD_ENOUGH
+        better, damping = _improve(look, here, gradient, curvature, 0.0 if near else damping, near)
         if better is None:
-            done = distance2 < GOOD_ENOUGH
+            done = near
             break
         here, iteration = better, iteration + 1
     return Optimum(here.q, here.squares, information, iteration, float(np.sqrt(distance2)), done)
@@ -173,10 +174,18 @@ class _Point(NamedTuple):
 
 
 def _improve(
-    look: Callable[[Array], _Point], here: _Point, gradient: Array, curvature: Curvature, damping: float
+    look: Callable[[Array], _Point],
+    here: _Point,
+    gradient: Array,
+    curvature: Curvature,
+    damping: float,
+    near: bool,
 ) -> tuple[_Point | None, float]:
-    """A point of less cost, None where rounding hides it, and the damping to go on with."""
-    while damping < MAX_DAMPING:
+    """A point of less cost, None where rounding hides it, and the damping to go on with.
+
+    Near the maximum nothing but rounding asks for damping, so none is tried there.
+    """
+    while damping <= (0 if near else MAX_DAMPING):
         step = curvature.solve(gradient, damping)
         there, slope = look(here.q + step), float(gradient @ step)
         if there.cost < here.cost:
