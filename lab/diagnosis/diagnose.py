@@ -251,7 +251,10 @@ def _own_change(state: State, candidate: Candidate, covariance: Array) -> tuple[
     weights = np.full(members.size, 1 / members.size)
     change = float(np.expm1(weights @ logs))
     scale = weights * parameters.widths[members]
-    std = float((1 + change) * np.sqrt(scale @ covariance[np.ix_(members, members)] @ scale))
+    # What changed is known no better than what it was before: its tolerance belongs to the error bar.
+    tolerance = float(np.sqrt(np.sum(scale**2)))
+    fitted = float(np.sqrt(scale @ covariance[np.ix_(members, members)] @ scale))
+    std = (1 + change) * float(np.hypot(fitted, tolerance))
     if candidate.cause == "mass_change" and candidate.location != EVERYWHERE:
         mass = float(state.misfit.twin.body_mass[members[0]])
         effect: Effect = MassChange(candidate.location, delta_mass=mass * change)
