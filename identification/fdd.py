@@ -11,7 +11,7 @@ from collections.abc import Iterable
 from dataclasses import dataclass
 
 import numpy as np
-import scipy.stats
+import scipy.special
 from numpy.typing import NDArray
 
 from identification.bells import Bell, bell_pole, find_bells
@@ -95,7 +95,8 @@ def fdd(
     S, U = np.maximum(power[:, ::-1], 0), vectors[:, :, ::-1]
     segments, n = spectra.segments, spectra.segments.n_averages
     # Half as many lines as the padded transform has are independent, and any two of them may be compared.
-    factor = float(scipy.stats.f.isf(CHANCE / (len(S) / 2) ** 2, 2 * n, 2 * n))
+    share = scipy.special.betainccinv(n, n, CHANCE / (len(S) / 2) ** 2)
+    factor = float(share / (1 - share))  # of two spectra with 2n degrees of freedom each: the F distribution
     bells = find_bells(S, U, factor=factor, min_mac=min_mac)
     window = spectra.lag_window()
     poles = np.array([bell_pole(bell, 2 * segments.length, recording.dt, window) for bell in bells], complex)

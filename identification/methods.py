@@ -9,6 +9,9 @@ from typing import Any
 
 from identification.era import era
 from identification.errors import IdentificationError
+from identification.fdd import efdd
+from identification.frequency_domain import plscf_recording
+from identification.next_era import next_era
 from identification.okid import okid_era
 from identification.pulse import markov_parameters
 from identification.recording import Recording
@@ -186,6 +189,30 @@ METHODS = {
             finds_order=False,
             kinds=("ambient", "random", "burst_random", "sweep", "multisine", "other"),
             summary="Stochastic subspace identification, from a projection of the outputs themselves.",
+        ),
+        Method(
+            name="next_era",
+            function=next_era,
+            needs_inputs=False,
+            finds_order=False,
+            kinds=("ambient", "random", "burst_random", "sweep", "multisine", "other"),
+            summary="Natural excitation technique: output correlations realized like free decays.",
+        ),
+        Method(
+            name="plscf",
+            function=plscf_recording,
+            needs_inputs=False,
+            finds_order=False,
+            kinds=("pulse", "impact", "random", "burst_random", "sweep", "multisine", "ambient", "other"),
+            summary="Poly-reference least squares in the frequency domain, from responses or output spectra.",
+        ),
+        Method(
+            name="efdd",
+            function=efdd,
+            needs_inputs=False,
+            finds_order=True,
+            kinds=("ambient", "random", "burst_random", "sweep", "multisine", "other"),
+            summary="Enhanced frequency domain decomposition: the peaks of the output spectra and their decay.",
         ),
     )
 }
