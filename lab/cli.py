@@ -8,6 +8,7 @@ import shlex
 import signal
 import sys
 from collections.abc import Callable, Sequence
+from functools import partial
 from pathlib import Path
 from types import FrameType
 from typing import Any, NoReturn
@@ -18,6 +19,7 @@ EXAMPLES = {
     "list": "lab list scenarios",
     "run": "lab run scenarios/chain3_pulse.toml --out out/chain3",
     "identify": "lab identify out/chain3/recording.h5 --method era --out out/again",
+    "diagnose": "lab diagnose my_test.h5 --model my_structure.xml --out out/my_test",
     "view": "lab view out/chain3",
 }
 
@@ -58,7 +60,7 @@ def _method_options(function: Callable[..., None]) -> Callable[..., None]:
 @click.version_option(package_name="virtual-modal-lab", prog_name="lab")
 @click.pass_context
 def cli(context: click.Context) -> None:
-    """The virtual modal lab: simulate, measure, identify, compare."""
+    """The virtual modal lab: simulate, measure, identify, compare, diagnose."""
     if context.invoked_subcommand is None:
         click.echo(context.get_help())
 
@@ -136,6 +138,56 @@ def identify_command(
     _tell(result, folder, as_json, quiet)
 
 
+@_command("diagnose")
+@click.argument("recording", metavar="RECORDING.h5", type=click.Path(path_type=Path))
+@_output_options
+@click.option(
+    "--map",
+    "mapping",
+    metavar="FILE.toml",
+    type=click.Path(path_type=Path),
+    help='Renames channels: lines "name in the recording" = "name in the model".',
+)
+@click.option(
+    "--baseline",
+    metavar="RECORDING.h5",
+    type=click.Path(path_type=Path),
+    help="Recording of the same structure in its known state, to calibrate the model first.",
+)
+@click.option(
+    "--model", metavar="MODEL.xml", required=True, help="What the structure is believed to be, in MJCF."
+)
+def diagnose_command(
+    recording: Path,
+    model: str,
+    baseline: Path | None,
+    mapping: Path | None,
+    out: Path | None,
+    force: bool,
+    as_json: bool,
+    quiet: bool,
+) -> None:
+    """What a model gets wrong in a recording, why, the extended model, and the gain."""
+    from lab.diagnose_files import diagnose_file
+    from lab.diagnosis_summary import diagnosis_summary
+    from lab.files.diagnosis import diagnosis_document
+
+    folder = out or Path("out") / f"{recording.resolve().parent.name}_{recording.stem}_diagnosis"
+    with _Doing(quiet) as progress:
+        diagnosis, known = diagnose_file(
+            recording,
+            model,
+            folder,
+            baseline=baseline,
+            mapping=mapping,
+            force=force,
+            command=_typed(),
+            progress=progress,
+        )
+    document, text = partial(diagnosis_document, diagnosis), partial(diagnosis_summary, diagnosis, known)
+    _print_outcome(document, text, diagnosis.warnings, folder, as_json, quiet)
+
+
 @_command("view")
 @click.argument("folder", metavar="DIR", type=click.Path(path_type=Path))
 def view_command(folder: Path) -> None:
@@ -207,17 +259,48 @@ class _Progress:
             self.bar.__exit__(*error)
 
 
+class _Doing:
+    """What is being done, on one line of a terminal, and nothing elsewhere."""
+
+    def __init__(self, quiet: bool) -> None:
+        self.shown = sys.stderr.isatty() and not quiet
+
+    def __enter__(self) -> Callable[[str], None]:
+        return self.show
+
+    def show(self, what: str) -> None:
+        if self.shown:
+            # Back to the start of the line, which is cleared.
+            click.echo(f"\r\x1b[K{what} …", nl=False, err=True)
+
+    def __exit__(self, *error: Any) -> None:
+        if self.shown:
+            click.echo("\r\x1b[K", nl=False, err=True)
+
+
 def _tell(result: Any, folder: Path, as_json: bool, quiet: bool) -> None:
     from lab.files.results import result_document
     from lab.summary import summary
 
+    document, text = partial(result_document, result), partial(summary, result)
+    _print_outcome(document, text, result.warnings, folder, as_json, quiet)
+
+
+def _print_outcome(
+    document: Callable[[], Any],
+    summary: Callable[[], str],
+    warnings: Sequence[str],
+    folder: Path,
+    as_json: bool,
+    quiet: bool,
+) -> None:
     if as_json:
-        _print_json(result_document(result))
+        _print_json(document())
     elif not quiet:
-        click.echo(summary(result))
+        click.echo(summary())
         click.echo(f"\nwritten: {folder}, with report.html; see it move with: lab view {folder}")
     else:
-        for warning in result.warnings:
+        for warning in warnings:
             click.echo(f"warning: {warning}", err=True)
 
 

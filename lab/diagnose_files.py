@@ -1,0 +1,137 @@
+"""A recording file and a model file in, a folder with the diagnosis out."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from identification.recording import Recording
+from lab import catalogue
+from lab.diagnosis.diagnose import Progress, diagnose
+from lab.diagnosis.outcome import Diagnosis
+from lab.errors import LabError, RigError
+from lab.files.diagnosis import save_diagnosis
+from lab.files.folder import output_folder
+from lab.files.recording import load
+from lab.matching import Names, matched, read_mapping, renamed, same_channels
+from lab.replay import Replay
+from lab.rig import Rig
+from lab.simulate import Motion, motion
+
+PERIODS_SHOWN = 20
+"""Length of the motion kept for the viewer, in periods of the lowest mode."""
+
+
+def diagnose_file(
+    path: str | Path,
+    model: str | Path,
+    out: str | Path,
+    *,
+    baseline: str | Path | None = None,
+    mapping: str | Path | Names | None = None,
+    force: bool = False,
+    command: str = "",
+    progress: Progress | None = None,
+) -> tuple[Diagnosis, Recording]:
+    """What a model gets wrong in a recording: found, written, shown.
+
+    Args:
+        path: recording file.
+        model: model file, or a name from the catalogue of models.
+        out: folder to come, with diagnosis.json, extended.xml, report.html and run.rrd.
+        baseline: recording file of the same rig in its known state.
+        mapping: file that renames channels of recording and baseline, or the names themselves (see `lab.matching`).
+        force: replace an earlier output there.
+        command: how the lab was called, for the report.
+        progress: told what is being done.
+
+    Returns:
+        The diagnosis, and the recording with its channels as the model names them.
+
+    Raises:
+        LabError, IdentificationError: the files do not fit together, or the folder cannot be written.
+    """
+    with output_folder(out, force=force) as folder:
+        names = read_mapping(mapping) if isinstance(mapping, str | Path) else mapping or {}
+        recording = renamed(load(path), names)
+        rig = matched(_rig(model), recording)
+        known = None if baseline is None else same_channels(renamed(load(baseline), names), recording)
+        diagnosis = diagnose(recording, rig, baseline=known, progress=progress)
+        if progress is not None:
+            progress("writing the report")
+        facts = _facts({"Recording": path, "Model": model, "Baseline": baseline, "Names": mapping})
+        present_diagnosis(folder, diagnosis, recording, command=command, facts=facts)
+    return diagnosis, recording
+
+
+def present_diagnosis(
+    folder: Path,
+    diagnosis: Diagnosis,
+    recording: Recording,
+    *,
+    command: str = "",
+    facts: dict[str, str] | None = None,
+) -> None:
+    """Writes diagnosis.json, extended.xml, report.html and run.rrd into a folder.
+
+    Args:
+        folder: to write into.
+        diagnosis: what to tell.
+        recording: what it was found in, with the channels of the diagnosis.
+        command: how the lab was called.
+        facts: further facts to reproduce it, by name.
+    """
+    # Imported here because drawing is slow to load and `lab` must come up without it.
+    from lab.show.diagnosis_report import write_diagnosis_report
+    from lab.show.rerun_log.diagnosis import write_diagnosis_rrd
+
+    save_diagnosis(diagnosis, folder / "diagnosis.json")
+    diagnosis.extended.save(folder / "extended.xml")
+    write_diagnosis_report(folder / "report.html", diagnosis, recording, command=command, facts=facts)
+    write_diagnosis_rrd(folder / "run.rrd", diagnosis, recording, motions=_first_swings(diagnosis, recording))
+
+
+def _rig(model: str | Path) -> Rig:
+    path = Path(model) if Path(model).exists() else catalogue.find("models", str(model))
+    try:
+        return Rig.load(path)
+    except RigError as error:
+        raise RigError(f"{error} (in {path})") from None
+
+
+def _facts(given: dict[str, str | Path | Names | None]) -> dict[str, str]:
+    """The files given, with their checksums."""
+    facts: dict[str, str] = {}
+    for name, path in given.items():
+        if isinstance(path, str | Path):
+            facts[name] = f"{path}{_checksum(Path(path))}"
+    return facts
+
+
+def _checksum(path: Path) -> str:
+    import hashlib
+
+    if not path.is_file():
+        return ""
+    with path.open("rb") as file:
+        return f", SHA-256 {hashlib.file_digest(file, 'sha256').hexdigest()}"
+
+
+def _first_swings(diagnosis: Diagnosis, recording: Recording) -> tuple[Motion, Motion] | None:
+    """The start of the first record in both models, long enough to watch; None where it cannot be had."""
+    record = recording.records[0]
+    if not record.inputs.shape[0]:
+        return None
+    lowest = diagnosis.nominal.second_order().modes().frequency_hz[:1]
+    duration = record.n_samples / recording.sample_rate
+    if lowest.size and lowest[0] > 0:
+        duration = min(duration, PERIODS_SHOWN / lowest[0])
+    again = Replay(inputs=record.inputs[:, :])
+    try:
+        nominal, extended = (
+            motion(rig, again, sample_rate=recording.sample_rate, duration=duration)
+            for rig in (diagnosis.nominal, diagnosis.extended)
+        )
+    except LabError:
+        # A picture is no reason to lose a diagnosis: the numbers do not depend on it.
+        return None
+    return nominal, extended
