@@ -66,7 +66,7 @@ def renamed(recording: Recording, names: Names) -> Recording:
                 f"{side[:-1]} channel {twice[0]!r} would appear twice after renaming; expected unique new names"
             )
         sides[side] = tuple(new)
-    return replace(recording, **sides)
+    return replace(recording, inputs=sides["inputs"], outputs=sides["outputs"])
 
 
 def matched(rig: Rig, recording: Recording) -> Rig:
