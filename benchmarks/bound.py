@@ -68,7 +68,7 @@ def chain3() -> Setup:
         systems.chain3("coupled"),
         recording,
         lambda noisy: era(markov_parameters(noisy), 6, n_rows=100, n_columns=100).system,
-        {0.05: 1.1},
+        {0.05: 1.1, 0.01: 1.15, 0.2: 1.15},
     )
 
 
@@ -76,7 +76,9 @@ def truss() -> Setup:
     """The layout of 5.4 under one random record of 3000 samples."""
     force = np.random.default_rng(54).standard_normal((4, 3000))
     recording = systems.recorded(systems.paper_truss(0.02), [force])
-    return Setup(systems.truss(), recording, lambda noisy: okid_era(noisy, 16).system, {})
+    # At 20 % noise the scatter of the weakest entry, C15, is beyond first order: no estimate need reach the bound.
+    limits = {0.05: 1.15, 0.01: 1.15}
+    return Setup(systems.truss(), recording, lambda noisy: okid_era(noisy, 16).system, limits)
 
 
 SYSTEMS = {"chain3": chain3, "truss": truss}
@@ -189,14 +191,14 @@ def report(name: str, level: float, setup: Setup, bound: Bound, results: MonteCa
     honest = rms(stds) / np.std(values, axis=0, ddof=1)
     if name == "chain3":
         print_table(level, truth, least, plain, ml, np.array(results.plain), values, honest)
-    limit = setup.limit.get(level, 1.15)
+    limit = (0.0, setup.limit[level]) if level in setup.limit else None
     modes, mode_stds = np.array(results.modes), np.array(results.mode_stds)
     mode_honest = rms(mode_stds) / np.std(modes, axis=0, ddof=1)
     mode_ratio = rms(modes - modal(setup.truth.modes())) / modal_std(bound.modes)
     lines = (
         ("ERA RMS error / bound", plain / least, None),
         ("ML RMS error / bound, M, C, K", ml / least, None),
-        ("the same, luck of the draw removed", ml / rms(np.array(results.ideal)), (0, limit)),
+        ("the same, luck of the draw removed", ml / rms(np.array(results.ideal)), limit),
         ("ML RMS error / bound, modes", mode_ratio, None),
         ("reported std / spread, M, C, K", honest, (0.8, 1.25)),
         ("reported std / spread, modes", mode_honest, (0.8, 1.25)),

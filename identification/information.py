@@ -15,7 +15,7 @@ from identification.modal_parameters import ModalParameters
 from identification.modes import Modes
 from identification.output_error import OutputError, output_error, simulated
 from identification.parameterizations import Parameterization
-from identification.recording import Array, Channel, Record, Recording
+from identification.recording import Array, Channel, Record, Recording, frozen
 from identification.scoring import Curvature
 from identification.systems import SecondOrder
 
@@ -39,6 +39,10 @@ class Bound:
     blind: Array
     second_order: SecondOrder | None
     modes: Modes
+
+    def __post_init__(self) -> None:
+        for name in ("values", "covariance", "blind"):
+            object.__setattr__(self, name, frozen(getattr(self, name)))
 
     @property
     def std(self) -> Array:

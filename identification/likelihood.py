@@ -18,7 +18,7 @@ from identification.modal_parameters import ModalParameters
 from identification.modes import Modes
 from identification.output_error import OutputError, output_error, simulated
 from identification.parameterizations import Parameterization
-from identification.recording import Array, Recording
+from identification.recording import Array, Recording, frozen
 from identification.scoring import Noise, Optimum, maximize, noise_model, solve_linear
 from identification.structures import LinearStructure
 from identification.systems import Realization, SecondOrder, StateSpace
@@ -65,6 +65,10 @@ class Estimate:
     converged: bool
     n_iterations: int
     notes: tuple[str, ...] = ()
+
+    def __post_init__(self) -> None:
+        for name in ("values", "covariance", "blind", "noise_std", "whiteness"):
+            object.__setattr__(self, name, frozen(getattr(self, name)))
 
     @property
     def std(self) -> Array:

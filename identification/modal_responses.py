@@ -127,11 +127,14 @@ def normal_equations(
         residual = run.outputs[:, where] - predict @ X[: predict.shape[1]]
         G = G + X @ X.T
         V = V + X @ residual.T
-    gradient, information = 0.0, 0.0
+    n = tangent.n_parameters + (0 if initial is None else tangent.system.n_states)
+    gradient, information = np.zeros(n), np.zeros((n, n))
     for o, T in enumerate(_coefficients(tangent, modes, run, initial, pairs)):
-        gradient = gradient + weights[o] * (T @ V[:, o])
-        information = information + weights[o] * (T @ G @ T.T)
-    return np.asarray(gradient), np.asarray(information)
+        # The shape at one output does not move the others.
+        rows = np.flatnonzero(np.any(T, axis=1))
+        gradient[rows] += weights[o] * (T[rows] @ V[:, o])
+        information[np.ix_(rows, rows)] += weights[o] * (T[rows] @ G @ T[rows].T)
+    return gradient, information
 
 
 def close_pairs(modes: Spectrum, system_dt: float, run: Run) -> Pairs:

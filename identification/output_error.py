@@ -11,7 +11,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from identification import cascade, modal_responses
-from identification.errors import RecordingError
+from identification.errors import IdentificationError, RecordingError
 from identification.modal_responses import Run
 from identification.parameterizations import Parameterization, Tangent
 from identification.recording import Array, Channel, Recording
@@ -129,6 +129,7 @@ def output_error(
         initial_state: `rest`, `free`, or `auto` for free in free decays only.
 
     Raises:
+        IdentificationError: there is no model at θ.
         RecordingError: samples are missing, a record has neither inputs nor a free initial state, the model is
             sampled at another rate, or `initial_state` is unknown.
     """
@@ -150,7 +151,13 @@ def output_error(
         active = np.flatnonzero(np.any(inputs, axis=1)) if inputs is not None else np.zeros(0, dtype=np.intp)
         forces = inputs[active] if inputs is not None else np.zeros((0, record.n_samples))
         runs.append(Run(forces, active, np.asarray(record.outputs[:, :], dtype=float), recording.dt))
-    system = parameterization.tangent(theta, recording.inputs, recording.outputs).system
+    try:
+        system = parameterization.tangent(theta, recording.inputs, recording.outputs).system
+    except np.linalg.LinAlgError as error:
+        raise IdentificationError(
+            f"the start has no state space ({error}), as when its mass matrix is singular; give every degree of freedom "
+            "a mass"
+        ) from error
     if system.dt and abs(system.dt / recording.dt - 1) > 1e-9:
         raise RecordingError(
             f"the recording has {recording.sample_rate:g} Hz and the start is sampled at {1 / system.dt:g} Hz; "

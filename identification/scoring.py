@@ -146,8 +146,7 @@ def maximize(problem: OutputError, noise: Noise, start: Array, *, max_iterations
     here, damping, iteration = look(start), 0.0, 0
     if not np.isfinite(here.cost):
         raise IdentificationError(
-            "the model of the start grows beyond all bounds within a record or has a singular mass matrix; "
-            "start from a stable model"
+            "the model of the start grows beyond all bounds within a record; start from a stable one"
         )
     while True:
         gradient, information = problem.normal_equations(here.q, 1 / noise.variance(here.squares))

@@ -7,7 +7,6 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-import scipy.linalg
 
 from identification.errors import IdentificationError, NotSecondOrderError
 from identification.parameterizations import Tangent, start_values
@@ -40,7 +39,7 @@ class StructureTangent:
         """
         s = self.structure
         B, C_p, C_v, C_a = channel_matrices(s.dofs, inputs, outputs)
-        W = scipy.linalg.inv(s.mass)
+        W = np.linalg.inv(s.mass)
         WB, WC, WK = W @ B, W @ s.damping, W @ s.stiffness
         # ∂(M⁻¹ X) = M⁻¹ (∂X - ∂M M⁻¹ X)
         dWB, dWC, dWK = (

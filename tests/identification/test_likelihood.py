@@ -333,6 +333,8 @@ def test_inputs_at_fault():
     )
     with pytest.raises(RecordingError, match="has no measured inputs"):
         refine(ambient, TRUTH)
+    with pytest.raises(IdentificationError, match=r"no state space .*singular"):
+        refine(recording, replace(TRUTH, mass=np.zeros((3, 3))))
     growing = Custom(
         ("a",),
         lambda a: StateSpace([a], [[1.0]], [[1.0]], [[0.0]], 0.0, (Channel("u", "N"),), (Channel("y", "m"),)),
