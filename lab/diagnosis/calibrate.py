@@ -54,9 +54,9 @@ def parameters_of(twin: Twin, widths: Mapping[str, float] | None = None) -> Para
     return Parameters(tuple(names), np.array(values, dtype=float), *sizes, np.eye(len(names)))
 
 
-def calibrate(misfit: Misfit, rig: Rig, *, start: Array | None = None) -> Calibration:
+def calibrate(misfit: Misfit, rig: Rig) -> Calibration:
     """The most likely parameters of the model as it is, without any cause."""
-    theta = np.zeros(misfit.parameters.n) if start is None else start
+    theta = np.zeros(misfit.parameters.n)
     misfit = replace(misfit, survey=survey_of(misfit, rig, theta, ()))
     rough = fit(misfit, theta, observer=kalman_gain(misfit, theta, SHARES[0]), iterations=4)
     theta = rough.theta

@@ -14,7 +14,7 @@ from lab.diagnosis.calibrate import Calibration, calibrate, parameters_of, surve
 from lab.diagnosis.evidence import minus_two_log_evidence
 from lab.diagnosis.fit import Fit, fit
 from lab.diagnosis.gain import errors_of, held_out_error, noise_floor, predictions_of
-from lab.diagnosis.misfit import Misfit
+from lab.diagnosis.misfit import Misfit, Parameters
 from lab.diagnosis.outcome import (
     CONSISTENT,
     EXPLAINED,
@@ -91,19 +91,19 @@ def diagnose(
         LabError: recording and model do not fit together, or the recording has no measured input.
     """
     tell = progress or (lambda what: None)
-    rig = _connected(rig, recording)
+    rig = nominal = _connected(rig, recording)
     model = twin(rig)
-    misfit = Misfit.of(recording, model, parameters_of(model, widths))
-    start = None
+    parameters = parameters_of(model, widths)
     if baseline is not None:
         tell("calibrating on the baseline")
-        base = Misfit.of(_like(baseline, recording), model, misfit.parameters, share=1.0)
+        base = Misfit.of(_like(baseline, recording), model, parameters, share=1.0)
         known = calibrate(base, rig).fit
-        # What the baseline taught is the new prior: its mean and its precision.
-        spread = np.sqrt(np.diag(known.covariance))
-        misfit, start = _tightened(misfit, spread), known.theta
+        # What the baseline taught becomes the model, and what it left open the prior.
+        rig = calibrated_rig(base, known.theta, rig)
+        model, parameters = twin(rig), _tightened(parameters, known)
+    misfit = Misfit.of(recording, model, parameters)
     tell("calibrating")
-    calibration = calibrate(misfit, rig, start=start)
+    calibration = calibrate(misfit, rig)
     found = calibration.fit
     state = State(calibration, found, (), found, (held_out_error(calibration.misfit, found),))
     inputs = np.concatenate(
@@ -124,7 +124,7 @@ def diagnose(
             break
     state = _finely(_without_idle(state))
     left = whiteness(state.fit.residual, inputs)
-    return _outcome(state, recording, rig, first, left)
+    return _outcome(state, recording, nominal, rig, first, left)
 
 
 def evidence_threshold(looks: int) -> float:
@@ -159,10 +159,10 @@ def _like(baseline: Recording, recording: Recording) -> Recording:
     )
 
 
-def _tightened(misfit: Misfit, spread: Array) -> Misfit:
-    """The misfit with prior widths shrunk to what a baseline left open, never below a tenth of a percent."""
-    widths = np.maximum(misfit.parameters.widths * np.minimum(spread, 1.0), 1e-3)
-    return replace(misfit, parameters=replace(misfit.parameters, widths=widths))
+def _tightened(parameters: Parameters, known: Fit) -> Parameters:
+    """The parameters with prior widths shrunk to what a baseline left open, never below a tenth of a percent."""
+    spread = np.sqrt(np.diag(known.covariance))[: parameters.n]
+    return replace(parameters, widths=np.maximum(parameters.widths * np.minimum(spread, 1.0), 1e-3))
 
 
 def _with(state: State, candidate: Candidate, rig: Rig) -> State:
@@ -265,7 +265,7 @@ def _own_change(state: State, candidate: Candidate, covariance: Array) -> tuple[
 
 
 def _outcome(
-    state: State, recording: Recording, rig: Rig, first: Sequence[Candidate], left: Whiteness
+    state: State, recording: Recording, nominal: Rig, rig: Rig, first: Sequence[Candidate], left: Whiteness
 ) -> Diagnosis:
     causes = effects_of(state)
     calibrated = calibrated_rig(state.misfit, state.origin.theta, rig)
@@ -275,7 +275,7 @@ def _outcome(
             extended = effect.apply(extended)
     floor = noise_floor(state.fit.residual, state.misfit.measured)
     accuracy = max(0.1 * floor, 1e-6)
-    predictions = predictions_of(recording, state.misfit, (rig, calibrated, extended), accuracy=accuracy)
+    predictions = predictions_of(recording, state.misfit, (nominal, calibrated, extended), accuracy=accuracy)
     shares = _shares(state, floor)
     findings = [
         Finding(effect, quantities, 0.5 * candidate.gain, share, words.says(effect, quantities))
@@ -292,7 +292,7 @@ def _outcome(
         calibration_of(state),
         errors_of(predictions, floor),
         predictions,
-        rig,
+        nominal,
         extended,
         tuple(warnings),
     )
