@@ -73,7 +73,9 @@ def test_it_ignores_no_setting(method):
 
 
 def test_an_unknown_name_is_told_with_those_that_exist():
-    with pytest.raises(IdentificationError, match=r"'eera' does not exist; there are era, okid_era, ssi_cov, ssi_data"):
+    with pytest.raises(
+        IdentificationError, match=r"'eera' does not exist; there are era, okid_era, ssi_cov, ssi_data"
+    ):
         find_method("eera")
 
 
