@@ -7,18 +7,15 @@ R_0 is not: it carries the noise of the sensors, and stays out.
 from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
-from dataclasses import replace
 
 import numpy as np
 
 from identification.covariance import output_covariances, reference_rows
-from identification.era import era
-from identification.output_only import plan_hankel
-from identification.recording import Recording
+from identification.errors import OrderError
+from identification.output_only import leading_subspace, plan_hankel
+from identification.recording import Array, Recording
 from identification.ssi import balance
-from identification.systems import MarkovParameters, Realization, StateSpace
-
-MAX_COLUMNS = 500
+from identification.systems import Realization, StateSpace
 
 
 def next_era(
@@ -37,8 +34,7 @@ def next_era(
             None.
         orders: orders to realize besides `order`; chosen from the spectra when both are None.
         n_rows: block rows of the Hankel matrix; chosen from the lowest resonance when None.
-        references: names of the reference outputs, each of which gives a column of free decays; all when
-            None.
+        references: names of the reference outputs, each of which gives a free decay; all when None.
 
     Returns:
         The models, without inputs, and all singular values.
@@ -53,38 +49,54 @@ def next_era(
     """
     rows = reference_rows(recording, references)
     plan = plan_hankel(recording, order, orders, n_rows, rows.size)
-    n_columns = max(min(plan.n_rows, MAX_COLUMNS // rows.size), -(-plan.orders[-1] // rows.size))
-    R = output_covariances(recording, plan.n_rows + n_columns, references=references)
+    R = output_covariances(recording, plan.n_rows + plan.past[-1] + 1, references=references)
     scale = balance(R, recording, rows)  # (n_outputs, 1)
-    decays = MarkovParameters(
-        np.concatenate([np.zeros((1, *R.shape[1:])), R]),
-        recording.dt,
-        tuple(recording.outputs[row] for row in rows),
-        recording.outputs,
-    )
-    found = era(decays, plan.orders[-1], orders=plan.orders, n_rows=plan.n_rows, n_columns=n_columns)
-    notes = plan.notes
+    H0, H1 = (_hankel(R[lag:], plan.n_rows, plan.past) for lag in (0, 1))
+    U, singular_values = leading_subspace(H0, plan.orders[-1] + 2)
+    wanted = _within_rank(plan.orders, singular_values, H0.shape, swept=plan.swept)
+    P, S = U[:, : wanted[-1]], singular_values[: wanted[-1]]
+    Q = H0.T @ P / S
+    root = np.sqrt(S)
+    A = P.T @ H1 @ Q / root[:, None] / root  # nested: order n is the leading block
+    C = scale * P[: len(scale)] * root
+    n_outputs, notes = len(scale), plan.notes
     if order is None:
-        order = _steepest_drop(found)
+        order = _steepest_drop(singular_values, wanted)
         notes += (f"The singular values drop most steeply after the first {order}.",)
     systems = tuple(
         StateSpace(
-            system.A,
-            system.B[:, :0],
-            scale * system.C,
-            system.D[:, :0],
+            A[:n, :n],
+            np.zeros((n, 0)),
+            C[:, :n],
+            np.zeros((n_outputs, 0)),
             recording.dt,
             (),
             recording.outputs,
         )
-        for system in found.systems
+        for n in wanted
     )
-    settings = {**found.settings, "n_references": rows.size}
-    return replace(found, method="next_era", systems=systems, order=order, settings=settings, notes=notes)
+    return Realization("next_era", systems, singular_values, order, plan.settings(), notes)
 
 
-def _steepest_drop(realization: Realization) -> int:
+def _hankel(R: Array, n_rows: int, past: range) -> Array:
+    """Free decays below each other, from every lag of the past on, (n_rows * n_outputs, n_past * n_references)."""
+    return np.hstack([R[lag : lag + n_rows].reshape(-1, R.shape[2]) for lag in past])
+
+
+def _within_rank(orders: list[int], s: Array, shape: tuple[int, ...], *, swept: bool) -> list[int]:
+    """The orders that the data carry; the caller's own ones must be among them."""
+    rank = int(np.sum(s > np.finfo(float).eps * max(shape) * s[0]))
+    kept = [n for n in orders if n <= rank]
+    if not kept or (not swept and kept != orders):
+        raise OrderError(
+            f"order {orders[-1]} exceeds {rank}, the numerical rank of the covariances; "
+            "lower the order, or check the channels where the rank is zero"
+        )
+    return kept
+
+
+def _steepest_drop(s: Array, orders: list[int]) -> int:
     """The order after which the singular values fall by the largest factor."""
-    s = np.append(realization.singular_values, 0)
-    n = np.array(realization.orders)
-    return int(n[np.argmax(s[n - 1] / np.maximum(s[n], np.finfo(float).eps * s[0]))])
+    floor = np.finfo(float).eps * s[0]
+    n = np.array([order for order in orders if order < s.size] or orders[:1])
+    return int(n[np.argmax(s[n - 1] / np.maximum(s[np.minimum(n, s.size - 1)], floor))])
