@@ -74,7 +74,7 @@ def finding_table(diagnosis: Diagnosis) -> Table:
             words(finding.effect.cause),
             finding.effect.location,
             "; ".join(parameter(name, value) for name, value in finding.parameters.items()) or "none",
-            number(finding.log_evidence_gain),
+            evidence(finding.log_evidence_gain),
             share(finding.holdout_gain),
         )
         for finding in diagnosis.findings
@@ -90,8 +90,8 @@ def alternative_table(diagnosis: Diagnosis) -> Table:
         (
             words(other.cause),
             other.location,
-            number(other.log_evidence_gain),
-            number(best - other.log_evidence_gain),
+            evidence(other.log_evidence_gain),
+            evidence(best - other.log_evidence_gain),
             *((other.advice,) if advised else ()),
         )
         for other in diagnosis.alternatives
@@ -131,6 +131,13 @@ def parameter(name: str, quantity: Quantity) -> str:
     if " ± " in value and unit:
         value = f"({value})"
     return f"{name} = {value}{unit}"
+
+
+def evidence(value: float) -> str:
+    """A logarithm of evidence: tenths matter near zero only."""
+    if not math.isfinite(value):
+        return UNKNOWN
+    return f"{value:.1f}" if abs(value) < 1000 else f"{value:.0f}"
 
 
 def words(cause: str) -> str:
