@@ -12,7 +12,7 @@ import numpy as np
 
 from identification.recording import DERIVATIVE, Array, Record, Recording
 from lab import stepping
-from lab.chain import Delay, Process
+from lab.chain import Process
 from lab.errors import LabError
 from lab.excitation import BLOCK, Excitation, Load, Sampling
 from lab.files.recording import RecordingWriter, load
@@ -203,7 +203,7 @@ class _Bench:
         sampling = Sampling(sample_rate, n_samples)
         every = [load for _ in range(n_runs) for load in excitation.loads(rig, sampling, rng)]
         loads = tuple(replace(load, number=number) for number, load in enumerate(every))
-        bench = cls(rig, loads, sample_rate, Plan(1, False), 0.0, seed)
+        bench = cls(rig, loads, sample_rate, Plan(1), 0.0, seed)
         return bench._planned(accuracy)
 
     @property
@@ -217,26 +217,24 @@ class _Bench:
 
     def _planned(self, asked: float | None) -> _Bench:
         """The bench with substeps that reach the accuracy, as measured on the start of its first records."""
-        dt, chain = 1 / self.sample_rate, self.rig.chain
+        dt = 1 / self.sample_rate
         pilots, growth = self._pilots()
-        delays = [s.delay for s in (*chain.actuators, *chain.sensors) if isinstance(s, Delay)]
-
-        def guess(accuracy: float) -> Plan:
-            return stepping.aligned(stepping.first_guess(self.rig, dt, accuracy), dt, delays)
-
         accuracy = IDEAL_ACCURACY if asked is None else asked
-        if asked is None and chain.acquisition:
-            outputs = [part.outputs for part in self._with(guess(1e-4)).batch(pilots, None)]
+        if asked is None and self.rig.chain.acquisition:
+            coarse = self._with(stepping.first_guess(self.rig, dt, 1e-4))
+            outputs = [part.outputs for part in coarse.batch(pilots, None)]
             accuracy = self._default_accuracy(np.concatenate(outputs, axis=2))
         finest = FINEST if asked is not None else FINEST_UNASKED
-        best = plan = self._measured(guess(accuracy), pilots, growth)
+        best = plan = self._measured(stepping.first_guess(self.rig, dt, accuracy), pilots, growth)
         in_vain = 0
         # Rounding puts a floor under the error: two finer plans that are hardly better have met it.
         while best.error > accuracy and plan.substeps < finest and in_vain < 2:
-            wanted = stepping.finer(self.rig, plan, accuracy)
-            wanted = stepping.aligned(replace(wanted, substeps=min(wanted.substeps, finest)), dt, delays)
-            plan = self._measured(wanted, pilots, growth)
-            in_vain = 0 if plan.error < best.error / 2 else in_vain + 1
+            before = plan.error
+            plan = self._measured(stepping.finer(self.rig, dt, plan, accuracy, finest), pilots, growth)
+            in_vain = 0 if plan.error < before / 2 else in_vain + 1
+            if in_vain and plan.cancelled and self.rig.chain.needs_substeps:
+                # An instrument clips: there is no power series to cancel.
+                plan, in_vain = self._measured(replace(plan, cancelled=()), pilots, growth), 0
             best = min(best, plan, key=lambda each: each.error)
         if best.error > accuracy and asked is not None:
             raise LabError(
@@ -261,7 +259,7 @@ class _Bench:
         return replace(self, plan=plan)
 
     def _error(self, plan: Plan, pilots: Sequence[Load]) -> float:
-        """Largest difference to twice the substeps, relative to the largest value of its channel."""
+        """Largest error, judged by twice the substeps, relative to the largest value of its channel."""
         plans = (plan, stepping.doubled(plan))
         coarse, fine = (
             np.concatenate([part.outputs for part in parts], axis=2)
@@ -273,7 +271,9 @@ class _Bench:
         for unit in {channel.unit for channel in self.rig.outputs}:
             same = [channel.unit == unit for channel in self.rig.outputs]
             largest[:, same] = np.maximum(largest[:, same], 1e-6 * np.max(largest[:, same]))
-        return float(np.max(difference / np.where(largest > 0, largest, 1.0)))
+        # The finer run has an error of its own, smaller by the power of two.
+        share = 1 - 2.0 ** -stepping.order_left(self.rig, plan)
+        return float(np.max(difference / np.where(largest > 0, largest, 1.0))) / share
 
     def _default_accuracy(self, outputs: Array) -> float:
         """`NOISE_SHARE` of the smallest noise of an output channel, relative to the largest value of the channel."""
@@ -309,17 +309,14 @@ class _Bench:
     def _combined(self, loads: Sequence[Load], plans: Sequence[Plan]) -> Iterator[list[_Part]]:
         """What each of several plans makes of the loads; substeps that plans have in common are run once."""
         counts = sorted({count for plan in plans for count in plan.runs}, reverse=True)
-        memoryless = not self.rig.chain.needs_substeps
-        sensors = [[_sensors(self.rig, 1 / self.sample_rate) for _ in loads] for _ in plans]
+        sensors = [[_sensors(self.rig, 1 / self.sample_rate, between=False) for _ in loads] for _ in plans]
         for stretch in self._runs(loads, counts):
             done = []
             for plan, rows in zip(plans, sensors, strict=True):
                 parts = [stretch[counts.index(count)] for count in plan.runs]
                 outputs = plan.combined([part.outputs for part in parts])
                 positions = plan.combined([part.positions for part in parts])
-                if memoryless:
-                    # Without memory between samples, sensors need not see the substeps.
-                    outputs = np.stack([_sensed(row, y) for row, y in zip(rows, outputs, strict=True)])
+                outputs = np.stack([_sensed(row, y) for row, y in zip(rows, outputs, strict=True)])
                 done.append(replace(parts[0], outputs=outputs, positions=positions))
             yield done
 
@@ -403,7 +400,7 @@ class _Run:
         self.actuators = [
             [[s.start_held(h) for s in row if not s.at_samples] for row in stages] for _ in batch
         ]
-        self.sensors = [_sensors(rig, h) for _ in batch] if chain.needs_substeps else None
+        self.sensors = [_sensors(rig, h, between=True) for _ in batch] if chain.needs_substeps else None
         self.last_forces: Array | None = None
 
     def respond(self, commands: Array, forces: Array | None) -> _Part:
@@ -467,10 +464,14 @@ class _Run:
         return np.stack([before, readings, now], axis=2)
 
 
-def _sensors(rig: Rig, dt: float) -> list[list[Process]]:
-    """Fresh sensor stages for every output of one record."""
-    rng = np.random.default_rng(0)
-    return [[s.start(dt, rng, 0.0) for s in rig.chain.for_channel("sensors", c.name)] for c in rig.outputs]
+def _sensors(rig: Rig, dt: float, *, between: bool) -> list[list[Process]]:
+    """Fresh sensor stages for every output of one record: those that must see substeps, or those behind the last of them."""
+    rng, rows = np.random.default_rng(0), []
+    for channel in rig.outputs:
+        stages = rig.chain.for_channel("sensors", channel.name)
+        split = max((i + 1 for i, stage in enumerate(stages) if stage.needs_substeps), default=0)
+        rows.append([s.start(dt, rng, 0.0) for s in (stages[:split] if between else stages[split:])])
+    return rows
 
 
 def _sensed(processes: Sequence[Sequence[Process]], outputs: Array) -> Array:

@@ -20,6 +20,7 @@ from mujoco import rollout
 
 from identification.recording import Array
 from lab import laws, mjcf
+from lab.chain import Delay
 from lab.errors import DivergedError
 from lab.rig import Rig
 
@@ -35,29 +36,53 @@ class Plan:
 
     Attributes:
         substeps: per sample.
-        extrapolate: combine with runs of a half and a quarter as many substeps.
+        cancelled: powers of the substep that are cancelled in the error, by runs of a half and a quarter as many.
         error: measured error of the response relative to its largest value, per channel at worst.
     """
 
     substeps: int
-    extrapolate: bool
+    cancelled: tuple[int, ...] = ()
     error: float = float("nan")
 
     @property
     def runs(self) -> tuple[int, ...]:
-        """Substeps of every run that the result is combined from."""
-        return (
-            (self.substeps, self.substeps // 2, self.substeps // 4) if self.extrapolate else (self.substeps,)
-        )
+        """Substeps of every run that the result is combined from, finest first."""
+        return tuple(self.substeps >> halvings for halvings in range(len(self.cancelled) + 1))
 
     def combined(self, values: Sequence[Array]) -> Array:
-        """The result of all runs, finest first: the h⁴ and h⁵ terms of the error cancelled."""
+        """The result of all runs, finest first, the powers in `cancelled` gone from its error."""
         table = list(values)
-        for order in range(4, 4 + len(table) - 1):
+        for order in self.cancelled:
             table = [
                 (2**order * fine - coarse) / (2**order - 1) for fine, coarse in itertools.pairwise(table)
             ]
         return table[0]
+
+
+def cancellable(rig: Rig, dt: float) -> tuple[int, ...]:
+    """Powers of the substep that extrapolation can cancel; none where forces have kinks.
+
+    Instruments with a memory see straight lines between substeps, whose error goes with h². So they do as long as jumps of
+    the force stay between substeps, which a delay by a part of a sample would upset.
+    """
+    if not rig.smooth:
+        return ()
+    if not rig.chain.needs_substeps:
+        return (4, 5)
+    in_samples = np.array(delays(rig)) / dt
+    return (2, 4) if np.all(np.abs(in_samples - np.round(in_samples)) < 1e-9) else ()
+
+
+def order_left(rig: Rig, plan: Plan) -> int:
+    """The power of the substep with which the error of a plan falls."""
+    if plan.cancelled:
+        return plan.cancelled[-1] + 1
+    return 4 if rig.smooth and not rig.chain.needs_substeps else 2
+
+
+def delays(rig: Rig) -> list[float]:
+    """Delays [s] that actuators and sensors of the chain put between instants."""
+    return [s.delay for s in (*rig.chain.actuators, *rig.chain.sensors) if isinstance(s, Delay)]
 
 
 def first_guess(rig: Rig, dt: float, accuracy: float) -> Plan:
@@ -71,39 +96,35 @@ def first_guess(rig: Rig, dt: float, accuracy: float) -> Plan:
     phase = highest_frequency(rig) * dt
     at_least = max(int(np.ceil(phase / 2)), 1)
     plain = max(at_least, int(np.ceil(phase * (0.15 / accuracy) ** (1 / 4))))
-    if not _extrapolates(rig) or plain <= 16:
-        return Plan(plain, extrapolate=False)
+    cancelled = cancellable(rig, dt)
+    if not cancelled or (plain <= 16 and not rig.chain.needs_substeps):
+        return aligned(Plan(plain), dt, delays(rig))
     # The coarsest of the three runs must still be stable.
     fine = max(4 * at_least, int(np.ceil(phase * (0.1 / accuracy) ** (1 / 6))))
-    return Plan(4 * -(-fine // 4), extrapolate=True)
+    return Plan(4 * -(-fine // 4), cancelled)
 
 
-def _extrapolates(rig: Rig) -> bool:
-    """Whether errors follow a power series: no kinks in forces, no instruments that look between samples."""
-    return rig.smooth and not rig.chain.needs_substeps
-
-
-def finer(rig: Rig, plan: Plan, accuracy: float) -> Plan:
-    """A plan with the substeps that the measured error calls for."""
-    order = (6 if plan.extrapolate else 4) if _extrapolates(rig) else 2
-    factor = min(max(1.1 * (plan.error / accuracy) ** (1 / order), 1.15), 8.0)
-    return Plan(4 * int(np.ceil(plan.substeps * factor / 4)), plan.extrapolate)
+def finer(rig: Rig, dt: float, plan: Plan, accuracy: float, finest: int) -> Plan:
+    """A plan with the substeps that the measured error calls for, at most eight times as many, and at most `finest`."""
+    factor = min(max(1.1 * (plan.error / accuracy) ** (1 / order_left(rig, plan)), 1.15), 8.0)
+    finer_plan = Plan(min(4 * int(np.ceil(plan.substeps * factor / 4)), finest), plan.cancelled)
+    return finer_plan if plan.cancelled else aligned(finer_plan, dt, delays(rig))
 
 
 def doubled(plan: Plan) -> Plan:
     """The plan with twice the substeps, to measure the error of `plan`."""
-    return Plan(2 * plan.substeps, plan.extrapolate)
+    return Plan(2 * plan.substeps, plan.cancelled)
 
 
-def aligned(plan: Plan, dt: float, delays: Sequence[float]) -> Plan:
+def aligned(plan: Plan, dt: float, shifts: Sequence[float]) -> Plan:
     """The plan with up to twice the substeps, so that delays [s] come as close to whole substeps as they can."""
-    if not delays:
+    if not shifts:
         return plan
     counts = np.arange(plan.substeps, 2 * plan.substeps + 16)
-    in_substeps = np.multiply.outer(counts / dt, np.asarray(delays))
+    in_substeps = np.multiply.outer(counts / dt, np.asarray(shifts))
     away = np.max(np.abs(in_substeps - np.round(in_substeps)), axis=1)
     best = int(np.flatnonzero(away <= np.min(away) + 1e-9)[0])
-    return Plan(int(counts[best]), plan.extrapolate)
+    return Plan(int(counts[best]), plan.cancelled)
 
 
 def highest_frequency(rig: Rig) -> float:

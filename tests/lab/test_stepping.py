@@ -80,7 +80,7 @@ def errors_of(name, counts, *, n=60):
         readings, _ = stepper(rig, 1 / rate, count).advance(np.repeat(u, count, axis=2), None)
         found[count] = readings[0, rows, ::count]
     plain = [np.max(np.abs(found[count] - exact) / largest) for count in counts]
-    plans = [Plan(count, extrapolate=True) for count in counts if count // 4 in counts]
+    plans = [Plan(count, (4, 5)) for count in counts if count // 4 in counts]
     combined = [
         np.max(np.abs(plan.combined([found[c] for c in plan.runs]) - exact) / largest) for plan in plans
     ]
@@ -103,7 +103,7 @@ def test_orders_of_convergence(name, first):
     st.sampled_from([4, 12, 64]),
 )
 def test_extrapolation_cancels_the_fourth_and_fifth_order(limit, coefficients, substeps):
-    plan = Plan(substeps, extrapolate=True)
+    plan = Plan(substeps, (4, 5))
     assert plan.runs == (substeps, substeps // 2, substeps // 4)
     values = [
         np.array([limit + sum(c * (4 / s) ** p for c, p in zip(coefficients, (4, 5), strict=True))])
@@ -114,10 +114,10 @@ def test_extrapolation_cancels_the_fourth_and_fifth_order(limit, coefficients, s
 
 
 def test_plain_plan_runs_once():
-    plan = Plan(6, extrapolate=False)
+    plan = Plan(6)
     assert plan.runs == (6,)
     assert plan.combined([np.arange(3)]) is not None
-    assert stepping.doubled(plan) == Plan(12, extrapolate=False)
+    assert stepping.doubled(plan) == Plan(12)
 
 
 # Plans.
@@ -144,7 +144,7 @@ def test_first_guess_is_stable_and_near(accuracy):
 @given(st.floats(1e-4, 0.3), st.integers(1, 60))
 def test_delays_come_close_to_whole_substeps(delay, substeps):
     dt = 0.05
-    plan = stepping.aligned(Plan(substeps, extrapolate=False), dt, [delay])
+    plan = stepping.aligned(Plan(substeps), dt, [delay])
     assert substeps <= plan.substeps < 2 * substeps + 16
 
     def away(count):
@@ -154,7 +154,7 @@ def test_delays_come_close_to_whole_substeps(delay, substeps):
 
 
 def test_without_delays_a_plan_stays():
-    assert stepping.aligned(Plan(7, extrapolate=True), 0.1, []) == Plan(7, extrapolate=True)
+    assert stepping.aligned(Plan(7, (4, 5)), 0.1, []) == Plan(7, (4, 5))
 
 
 # Batches.
