@@ -146,6 +146,7 @@ class HeldLag(Stage):
 
     name: ClassVar[str] = "held_lag"
     at_samples: ClassVar[bool] = True
+    positive: ClassVar[tuple[str, ...]] = ("time_constant",)
     time_constant: float
 
     def start(self, dt: float, rng: np.random.Generator, rms: float) -> Process:

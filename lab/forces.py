@@ -2,7 +2,6 @@
 
 Extension x, its rate v, parameters p:
 
-
 CUBIC       p0 x³ + p1 x²
 QUADRATIC   p0 |v| v + p1 v³
 BILINEAR    p0 x for x > 0

@@ -37,13 +37,26 @@ def force(law, p, x, v, s):  # type: ignore[no-untyped-def]
 
 
 @njit(cache=True, nogil=True)
-def _coulomb(p, v_free, a):  # type: ignore[no-untyped-def]
-    """Friction force g at the end of a substep, where the velocity is v_free + a g with a < 0."""
-    stick = min(max(-v_free / a, -p[0]), p[0])
-    if p[1] <= 0:
-        return stick
+def _dry(F, v, v_free, a):  # type: ignore[no-untyped-def]
+    """Mean friction over a substep from velocity v, where the velocity at its end is v_free + a g with a < 0."""
+    if v != 0.0:
+        sign = 1.0 if v > 0 else -1.0
+        slipping = v_free + a * sign * F
+        if sign * slipping >= 0:
+            return sign * F
+        turned = v_free - a * sign * F
+        if sign * (turned - v) < 0:
+            # It stops on the way and sets off again in the other direction, for what is left of the substep.
+            end = (turned - v) * (1.0 - v / (v - slipping))
+            return min(max((end - v_free) / a, -F), F)
+    return min(max(-v_free / a, -F), F)
+
+
+@njit(cache=True, nogil=True)
+def _rounded(p, v_free, a):  # type: ignore[no-untyped-def]
+    """Friction p0 tanh(v / p1) at the end of a substep, where the velocity v is v_free + a g with a < 0."""
     low, high = -p[0], p[0]
-    g = stick
+    g = min(max(-v_free / a, low), high)
     # g - F tanh((v_free + a g) / eps) rises with g: Newton inside a shrinking bracket.
     for _ in range(60):
         t = math.tanh((v_free + a * g) / p[1])
@@ -62,32 +75,61 @@ def _coulomb(p, v_free, a):  # type: ignore[no-untyped-def]
 
 
 @njit(cache=True, nogil=True)
-def respond(F, G, P, Q, X, V, C, D, E, laws, params, u, x0, substeps, n_record, L, y):  # type: ignore[no-untyped-def]
+def _stick(S, T, R, x, u, laws, params, stuck, g):  # type: ignore[no-untyped-def]
+    """Puts into g the dry friction that acts at an instant: what holds a stuck law still, as far as it can."""
+    for _ in range(1 if laws.size <= 1 else 12):
+        moved = 0.0
+        for e in range(laws.size):
+            if stuck[e]:
+                pull = 0.0
+                for j in range(x.size):
+                    pull += S[e, j] * x[j]
+                for j in range(u.size):
+                    pull += T[e, j] * u[j]
+                for other in range(laws.size):
+                    if other != e:
+                        pull += R[e, other] * g[other]
+                old, F = g[e], params[e, 0]
+                g[e] = min(max(-pull / R[e, e], -F), F)
+                moved = max(moved, abs(g[e] - old) - 1e-12 * abs(g[e]))
+        if moved <= 0.0:
+            break
+
+
+@njit(cache=True, nogil=True)
+def respond(F, G, P, Q, X, V, S, T, R, C, D, E, laws, params, u, x0, n_record, L, y):  # type: ignore[no-untyped-def]
     """Outputs, shape (n_samples, n_outputs), of one record; NaN from where the motion diverges.
 
     Args:
-        F, G: state and held input over one substep, (n_states, n_states) and (n_states, n_inputs).
-        P, Q: forces of the laws that fall from one to zero and rise from zero to one over it, (n_states, n_laws).
+        F: state over one substep, (n_states, n_states).
+        G: inputs held over a sample, in each of its substeps, (substeps, n_states, n_inputs).
+        P, Q: forces of the laws that fall from one to zero and rise from zero to one over a substep, (n_states, n_laws);
+            for dry friction, which jumps, zero and the force that is one all along.
         X, V: rows of extension and of its rate, (n_laws, n_states).
+        S, T, R: rate of the rate from state, input and law forces.
         C, D, E: outputs from state, input and law forces.
         laws, params: law numbers (n_laws,) and parameters (n_laws, 3).
         u: inputs, (n_samples, n_inputs).
         x0: state at the start.
-        substeps: per sample.
         n_record: samples of the whole record, for drift.
         L: observer gain (n_states, n_outputs) that pulls the state to the measured `y`, or no rows.
         y: measured outputs, (n_samples, n_outputs), used with an observer only; NaN where missing.
     """
     n, n_states, n_inputs, n_outputs, n_laws = u.shape[0], F.shape[0], u.shape[1], C.shape[0], laws.size
     out = np.empty((n, n_outputs))
-    x, free, held = x0.copy(), np.zeros(n_states), np.zeros(n_states)
+    x, free = x0.copy(), np.zeros(n_states)
     g, z = np.zeros(n_laws), np.zeros(n_laws)
     a_x, a_v = np.zeros(n_laws), np.zeros(n_laws)
     for e in range(n_laws):
         for j in range(n_states):
             a_x[e] += X[e, j] * Q[j, e]
             a_v[e] += V[e, j] * Q[j, e]
-    observed = L.shape[0] > 0
+    observed, substeps = L.shape[0] > 0, G.shape[0]
+    dry = np.array([laws[e] == COULOMB and params[e, 1] <= 0 for e in range(n_laws)])
+    stuck = np.zeros(n_laws, dtype=np.bool_)
+    for e in range(n_laws):
+        stuck[e] = dry[e] and not np.any(V[e] * x0)
+    any_dry = np.any(dry)
     for k in range(n):
         s = k / n_record
         for pull in range(2 if observed else 1):
@@ -98,8 +140,12 @@ def respond(F, G, P, Q, X, V, C, D, E, laws, params, u, x0, substeps, n_record, 
                     ve += V[e, j] * x[j]
                 if laws[e] == BOUC_WEN:
                     g[e] = z[e]
-                elif laws[e] != COULOMB:
+                elif dry[e]:
+                    g[e] = params[e, 0] * np.sign(ve)
+                else:
                     g[e] = force(laws[e], params[e], xe, ve, s)
+            if any_dry:
+                _stick(S, T, R, x, u[k], laws, params, stuck, g)
             if pull == 1:
                 break
             for i in range(n_outputs):
@@ -117,15 +163,12 @@ def respond(F, G, P, Q, X, V, C, D, E, laws, params, u, x0, substeps, n_record, 
                     if error == error:
                         for j in range(n_states):
                             x[j] += L[j, i] * error
-        for j in range(n_states):
-            value = 0.0
-            for i in range(n_inputs):
-                value += G[j, i] * u[k, i]
-            held[j] = value
         for step in range(substeps):
             s = (k + (step + 1) / substeps) / n_record
             for j in range(n_states):
-                value = held[j]
+                value = 0.0
+                for i in range(n_inputs):
+                    value += G[step, j, i] * u[k, i]
                 for i in range(n_states):
                     value += F[j, i] * x[i]
                 for e in range(n_laws):
@@ -135,7 +178,7 @@ def respond(F, G, P, Q, X, V, C, D, E, laws, params, u, x0, substeps, n_record, 
             for _ in range(1 if n_laws <= 1 else 12):
                 moved = 0.0
                 for e in range(n_laws):
-                    xf, vf, xs = 0.0, 0.0, 0.0
+                    xf, vf, xs, vs = 0.0, 0.0, 0.0, 0.0
                     for j in range(n_states):
                         value = free[j]
                         for other in range(n_laws):
@@ -144,9 +187,13 @@ def respond(F, G, P, Q, X, V, C, D, E, laws, params, u, x0, substeps, n_record, 
                         xf += X[e, j] * value
                         vf += V[e, j] * value
                         xs += X[e, j] * x[j]
+                        vs += V[e, j] * x[j]
                     old = g[e]
-                    if laws[e] == COULOMB:
-                        g[e] = _coulomb(params[e], vf, a_v[e])
+                    if dry[e]:
+                        g[e] = _dry(params[e, 0], vs, vf, a_v[e])
+                        stuck[e] = abs(vf + a_v[e] * g[e]) <= 1e-12 * (abs(vf) + abs(a_v[e] * g[e]))
+                    elif laws[e] == COULOMB:
+                        g[e] = _rounded(params[e], vf, a_v[e])
                     elif laws[e] == BOUC_WEN:
                         trial = g[e]
                         for _ in range(8):

@@ -7,16 +7,21 @@ reference; the tests hold one against the other.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
 import scipy.linalg
-import scipy.signal
 
 from identification.recording import Array, Channel
+from lab.forces import COULOMB
+from lab.paths import Path as Path
+from lab.paths import pushed, recorded, structural
 
 NO_OBSERVER = np.zeros((0, 0))
+
+Changes = dict[int, tuple[int, float]]
+"""For each input column that acts after the force of a late actuator changes within a sample: the column that acts before,
+and when it changes [s]."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -42,27 +47,6 @@ class Tone:
     frequency_hz: float
     sine: float
     cosine: float
-
-
-@dataclass(frozen=True)
-class Path:
-    """What happens to one channel between structure and recording.
-
-    Attributes:
-        gain: factor.
-        delay: [s].
-        lag: time constant of a first-order lag [s].
-        held_lag: the same for an input whose lagging value is held over each sample, as a digital filter gives it [s].
-        limit: saturation either way [unit of the channel].
-        hum: sines added, each (frequency [Hz], sine, cosine).
-    """
-
-    gain: float = 1.0
-    delay: float = 0.0
-    lag: float = 0.0
-    held_lag: float = 0.0
-    limit: float = float("inf")
-    hum: tuple[tuple[float, float, float], ...] = ()
 
 
 @dataclass(frozen=True, eq=False)
@@ -130,7 +114,7 @@ class Responder:
     plant: Plant
     dt: float
     substeps: int
-    matrices: tuple[Array, ...]  # F, G, P, Q, X, V, C, D, E
+    matrices: tuple[Array, ...]  # F, G, P, Q, X, V, S, T, R, C, D, E
     laws: np.ndarray
     parameters: Array
 
@@ -158,17 +142,17 @@ class Responder:
         from lab import kernel
 
         plant = self.plant
-        u = _driven(
-            plant,
-            inputs[:, :n_samples] if inputs.shape[0] else np.zeros((len(plant.inputs), n_samples)),
-            self.dt,
-        )
+        if not inputs.shape[0]:
+            inputs = np.zeros((len(plant.inputs), n_samples))
+        u = self._driven(inputs[:, :n_samples])
         state = np.zeros(self.matrices[0].shape[0])
         if initial is not None:
             state[: initial.size] = initial
         y = np.zeros((0, 0))
         if measured is not None and observer.size:
-            y = np.ascontiguousarray(_structural(plant, measured[:, :n_samples], self.dt).T)
+            y = np.ascontiguousarray(
+                structural(plant.output_paths, plant.order, measured[:, :n_samples], self.dt).T
+            )
         with np.errstate(over="ignore", invalid="ignore"):
             out = kernel.respond(  # type: ignore[call-arg]
                 *self.matrices,
@@ -176,12 +160,20 @@ class Responder:
                 self.parameters,
                 u,
                 state,
-                self.substeps,
                 n_record or n_samples,
                 observer,
                 y,
             )
-        return _recorded(plant, np.ascontiguousarray(out.T), self.dt)
+        return recorded(plant.output_paths, plant.order, np.ascontiguousarray(out.T), self.dt)
+
+    def _driven(self, inputs: Array) -> Array:
+        """Inputs of the kernel, (n_samples, n_inputs): forces of the actuators, then of tones."""
+        columns = pushed(self.plant.input_paths, inputs, self.dt)
+        for tone in self.plant.tones:
+            # A force that nobody measured is held over each sample like every other.
+            phase = 2 * np.pi * tone.frequency_hz * np.arange(inputs.shape[1]) * self.dt
+            columns.append(tone.sine * np.sin(phase) + tone.cosine * np.cos(phase))
+        return np.array(columns).reshape(-1, inputs.shape[1]).T.copy()
 
 
 def ready(plant: Plant, dt: float, *, substeps: int = 6) -> Responder:
@@ -198,16 +190,20 @@ def ready(plant: Plant, dt: float, *, substeps: int = 6) -> Responder:
     )
     lagging_in = [i for i, path in enumerate(plant.input_paths) if path.lag]
     lagging_out = [i for i, path in enumerate(plant.output_paths) if path.lag]
+    late = [i for i, path in enumerate(plant.input_paths) if path.parts(dt)[1]]
     a, b = 2 * n + len(lagging_in), 2 * n + len(lagging_in) + len(lagging_out)
-    n_u = n_in + len(tones)
+    n_u = n_in + len(late) + len(tones)
     A, B, W = np.zeros((b, b)), np.zeros((b, n_u)), np.zeros((b, len(rows)))
     A[:n, n : 2 * n] = np.eye(n)
     A[n : 2 * n, :n], A[n : 2 * n, n : 2 * n] = from_q, from_v
-    B[n : 2 * n] = np.hstack([from_u, from_t])
+    B[n : 2 * n] = np.hstack([from_u, from_u[:, late], from_t])
     W[n : 2 * n] = from_g
+    # Every column of inputs belongs to a channel; a late one has two, before and after its force changes.
+    columns = [*range(n_in), *late]
     for slot, i in enumerate(lagging_in, start=2 * n):
-        A[n : 2 * n, slot], B[n : 2 * n, i] = from_u[:, i], 0.0
-        A[slot, slot], B[slot, i] = -1 / plant.input_paths[i].lag, 1 / plant.input_paths[i].lag
+        rate, own = 1 / plant.input_paths[i].lag, [j for j, channel in enumerate(columns) if channel == i]
+        A[n : 2 * n, slot], A[slot, slot] = from_u[:, i], -rate
+        B[n : 2 * n, own], B[slot, own] = 0.0, rate
     motion = np.zeros((n_out, b))
     motion[:, :n], motion[:, n : 2 * n] = plant.displacement, plant.velocity
     C = motion + plant.acceleration @ A[n : 2 * n]
@@ -217,36 +213,56 @@ def ready(plant: Plant, dt: float, *, substeps: int = 6) -> Responder:
         A[slot], B[slot], W[slot] = rate * C[i], rate * D[i], rate * E[i]
         A[slot, slot] -= rate
         C[i], D[i], E[i] = np.eye(b)[slot], 0.0, 0.0
-    F, G, P, Q = _over_a_substep(A, B, W, dt / sub)
-    C, D, E = _late_readings(plant, dt, A, B, W, C, D, E)
+    changes = {n_in + j: (i, plant.input_paths[i].parts(dt)[1] * dt) for j, i in enumerate(late)}
+    F, _, P, Q = _over_a_substep(A, B, W, dt / sub)
+    G = np.stack([_inputs_over(A, B, k * dt / sub, dt / sub, changes) for k in range(sub)])
+    dry = [i for i, law in enumerate(plant.laws) if law.kind == COULOMB and not law.parameters[1]]
+    Q[:, dry] += P[:, dry]
+    P[:, dry] = 0.0
     X, V = np.zeros((len(rows), b)), np.zeros((len(rows), b))
     X[:, :n], V[:, n : 2 * n] = rows, rows
+    S, T, R = V @ A, V @ _acting(B, 0.0, changes), V @ W
+    C, D, E = _late_readings(plant, dt, A, B, W, C, D, E, changes)
     parameters = np.zeros((len(rows), 3))
     for i, law in enumerate(plant.laws):
         parameters[i, : len(law.parameters)] = law.parameters
-    matrices = tuple(np.ascontiguousarray(m) for m in (F, G, P, Q, X, V, C, D, E))
+    matrices = tuple(np.ascontiguousarray(m) for m in (F, G, P, Q, X, V, S, T, R, C, D, E))
     kinds = np.array([law.kind for law in plant.laws], dtype=np.int64)
     return Responder(plant, dt, sub, matrices, kinds, parameters)
 
 
 def _late_readings(
-    plant: Plant, dt: float, A: Array, B: Array, W: Array, C: Array, D: Array, E: Array
+    plant: Plant, dt: float, A: Array, B: Array, W: Array, C: Array, D: Array, E: Array, changes: Changes
 ) -> tuple[Array, Array, Array]:
     """Readings of delayed outputs part of a sample after each instant, so that whole samples make up their delay."""
-    C, D, E = C.copy(), D.copy(), E.copy()
+    both, C, D, E = D, C.copy(), _acting(D, 0.0, changes), E.copy()
     for i, path in enumerate(plant.output_paths):
-        ahead = 1 - _parts(path.delay / dt)[1]
-        if ahead < 1:
-            F, G, P, Q = _over_a_substep(A, B, W, ahead * dt)
-            C[i], D[i], E[i] = C[i] @ F, C[i] @ G + D[i], C[i] @ (P + Q) + E[i]
+        ahead = (1 - path.parts(dt)[1]) * dt
+        if ahead < dt:
+            F, _, P, Q = _over_a_substep(A, B, W, ahead)
+            G = _inputs_over(A, B, 0.0, ahead, changes)
+            D[i] = C[i] @ G + _acting(both[[i]], ahead, changes)[0]
+            C[i], E[i] = C[i] @ F, C[i] @ (P + Q) + E[i]
     return C, D, E
 
 
-def _parts(samples: float) -> tuple[int, float]:
-    """Whole samples of a delay and the remaining part of one."""
-    whole = int(np.floor(samples + 1e-9))
-    part = samples - whole
-    return whole, part if part > 1e-9 else 0.0
+def _acting(columns: Array, t: float, changes: Changes) -> Array:
+    """Effect of inputs at a time t within a sample: of a late one, before or after its force changes."""
+    columns = columns.copy()
+    for after, (before, change) in changes.items():
+        columns[:, before if t >= change else after] = 0.0
+    return columns
+
+
+def _inputs_over(A: Array, B: Array, start: float, h: float, changes: Changes) -> Array:
+    """Transition of held inputs over h from a start within a sample."""
+    none = np.zeros((A.shape[0], 0))
+    G = _over_a_substep(A, B, none, h)[1]
+    for after, (before, change) in changes.items():
+        left = min(max(start + h - change, 0.0), h)
+        G[:, after] = _over_a_substep(A, B[:, [after]], none, left)[1][:, 0]
+        G[:, before] -= G[:, after]
+    return G
 
 
 def _over_a_substep(A: Array, B: Array, W: Array, h: float) -> tuple[Array, Array, Array, Array]:
@@ -259,73 +275,3 @@ def _over_a_substep(A: Array, B: Array, W: Array, h: float) -> tuple[Array, Arra
     expm = scipy.linalg.expm(block)[:b]
     whole, rising = expm[:, b + m : b + m + e], expm[:, b + m + e :]
     return expm[:, :b], expm[:, b : b + m], whole - rising, rising
-
-
-def _driven(plant: Plant, inputs: Array, dt: float) -> Array:
-    """Inputs of the kernel, (n_samples, n_inputs + n_tones): what actuators make of the recorded ones, and tones."""
-    n = inputs.shape[1]
-    columns = []
-    for row, path in zip(inputs, plant.input_paths, strict=True):
-        column = _late(row, path.delay / dt) if path.delay else row
-        if path.held_lag:
-            share = -np.expm1(-dt / path.held_lag)
-            column = scipy.signal.lfilter([share], [1, share - 1], column)
-        columns.append(np.clip(path.gain * column, -path.limit, path.limit))
-    for tone in plant.tones:
-        # A force that nobody measured is held over each sample like every other.
-        phase = 2 * np.pi * tone.frequency_hz * np.arange(n) * dt
-        columns.append(tone.sine * np.sin(phase) + tone.cosine * np.cos(phase))
-    return np.ascontiguousarray(np.stack(columns, axis=1)) if columns else np.zeros((n, 0))
-
-
-def _recorded(plant: Plant, outputs: Array, dt: float) -> Array:
-    """What the recorder gets of the structure's readings."""
-    for i, path in enumerate(plant.output_paths):
-        if path != Path():
-            whole, part = _parts(path.delay / dt)
-            signal = path.gain * _shifted(outputs[i], whole + (part > 0)) + _hum(path, outputs.shape[1], dt)
-            outputs[i] = np.clip(signal, -path.limit, path.limit)
-    return outputs[list(plant.order)] if plant.order else outputs
-
-
-def _structural(plant: Plant, recorded: Array, dt: float) -> Array:
-    """What the structure's readings were, as far as a recording tells: the chain undone, NaN where it cannot be."""
-    readings = np.array(recorded)
-    if plant.order:
-        readings[list(plant.order)] = recorded
-    for i, path in enumerate(plant.output_paths):
-        if path != Path():
-            whole, part = _parts(path.delay / dt)
-            clipped = np.abs(readings[i]) >= path.limit
-            gain = path.gain if abs(path.gain) > 1e-6 else np.nan
-            readings[i] = np.where(clipped, np.nan, (readings[i] - _hum(path, recorded.shape[1], dt)) / gain)
-            readings[i] = _shifted(readings[i], -(whole + (part > 0)))
-    return readings
-
-
-def _hum(path: Path, n: int, dt: float) -> Array:
-    signal = np.zeros(n)
-    for frequency, sine, cosine in path.hum:
-        phase = 2 * np.pi * frequency * np.arange(n) * dt
-        signal += sine * np.sin(phase) + cosine * np.cos(phase)
-    return signal
-
-
-def _late(held: Array, samples: float) -> Array:
-    """A held force that comes later: each sample holds the mean of what arrives over it."""
-    whole, part = _parts(samples)
-    padded = np.concatenate([np.zeros(min(whole, held.size) + 1), held])
-    return part * padded[: held.size] + (1 - part) * padded[1 : held.size + 1]
-
-
-def _shifted(signal: Array, samples: int) -> Array:
-    """A signal that comes whole samples later, from rest, or earlier, into the unknown."""
-    n = signal.size
-    if samples >= 0:
-        return np.concatenate([np.zeros(min(samples, n)), signal[: max(n - samples, 0)]])
-    return np.concatenate([signal[-samples:], np.full(min(-samples, n), np.nan)])
-
-
-def fresh_paths(channels: Sequence[Channel]) -> tuple[Path, ...]:
-    """An ideal path for every channel."""
-    return tuple(Path() for _ in channels)

@@ -12,7 +12,8 @@ from identification.recording import DERIVATIVE, Array
 from lab import chain as stages
 from lab import forces, laws, linearize
 from lab.errors import RigError
-from lab.plant import Law, Path, Plant, Tone, fresh_paths
+from lab.paths import ORDER, Path
+from lab.plant import Law, Plant, Tone
 from lab.ports import is_law
 from lab.rig import Rig, Spring
 
@@ -85,8 +86,8 @@ def twin(rig: Rig) -> Twin:
         *motion,
         rig.inputs,
         rig.outputs,
-        fresh_paths(rig.inputs),
-        fresh_paths(rig.outputs),
+        (Path(),) * len(rig.inputs),
+        (Path(),) * len(rig.outputs),
         stiffness,
         damping,
         (*local, *_frictions(rig, rows), *_user_laws(rig, rows)),
@@ -124,14 +125,18 @@ def spring_rows(rig: Rig) -> Array:
     return np.array(rows).reshape(-1, m.nv)
 
 
+def movable(model: mujoco.MjModel) -> list[int]:
+    """Numbers of the bodies that can move, in the order of `Rig.bodies`."""
+    return [i for i in range(1, model.nbody) if model.body_weldid[i] != 0]
+
+
 def _masses(rig: Rig) -> tuple[Array, Array]:
     """Part of M that each body brings, and its mass."""
     parts, masses = [], []
-    for body in rig.bodies:
+    for index in movable(rig.model):
         matrices = []
         for factor in (1.0, 2.0):
             m = copy.copy(rig.model)
-            index = m.body(body).id
             m.body_mass[index] *= factor
             m.body_inertia[index] *= factor
             data = mujoco.MjData(m)
@@ -143,7 +148,7 @@ def _masses(rig: Rig) -> tuple[Array, Array]:
             mujoco.mj_fullM(m, data, M)
             matrices.append(M)
         parts.append(matrices[1] - matrices[0])
-        masses.append(float(rig.model.body(body).mass[0]))
+        masses.append(float(rig.model.body_mass[index]))
     n = len(rig.dofs)
     return np.array(parts).reshape(-1, n, n), np.array(masses)
 
@@ -255,7 +260,7 @@ def _behind_chain(rig: Rig, plant: Plant) -> Plant:
     ):
         for i, channel in enumerate(channels):
             path = Path()
-            for stage in chain.for_channel(place, channel.name):
+            for stage in _in_order(chain.for_channel(place, channel.name), place):
                 path = _passed(path, stage)
             plant = change(plant, i, **vars(path))
     names = [channel.name for channel in rig.outputs]
@@ -272,19 +277,36 @@ def _behind_chain(rig: Rig, plant: Plant) -> Plant:
     return replace(plant, order=tuple(order) if chain.swaps else (), tones=tuple(tones))
 
 
+def _in_order(found: tuple[stages.Stage, ...], place: str) -> tuple[stages.Stage, ...]:
+    """Stages of one channel, checked to act in the order of a path."""
+    names = [stage.name for stage in found]
+    for stage in found:
+        if stage.name not in ORDER[place]:
+            raise RigError(
+                f"stage {stage.name!r} on channel {stage.channel!r} is not known to a plant; remove it from the {place}"
+            )
+    if names != sorted(names, key=ORDER[place].index) or any(
+        "lag" in name and names.count(name) > 1 for name in names
+    ):
+        raise RigError(
+            f"channel {found[0].channel!r} passes {', '.join(names)}; a plant knows {', '.join(ORDER[place])}, in this order "
+            "and each lag once"
+        )
+    return found
+
+
 def _passed(path: Path, stage: stages.Stage) -> Path:
-    """The path with one more stage; stages commute where both act as written."""
+    """The path with one more stage."""
     if isinstance(stage, stages.Gain):
         return replace(path, gain=path.gain * (1 + stage.relative_change))
     if isinstance(stage, stages.Delay):
         return replace(path, delay=path.delay + stage.delay)
     if isinstance(stage, stages.Saturation):
         return replace(path, limit=min(path.limit, stage.limit))
-    if isinstance(stage, stages.Lag) and not path.lag:
+    if isinstance(stage, stages.Lag):
         return replace(path, lag=1 / (2 * np.pi * stage.corner_hz))
-    if isinstance(stage, stages.Hum):
-        sine, cosine = stage.amplitude * np.cos(stage.phase), stage.amplitude * np.sin(stage.phase)
-        return replace(path, hum=(*path.hum, (stage.frequency_hz, float(sine), float(cosine))))
-    raise RigError(
-        f"stage {stage.name!r} on channel {stage.channel!r} is not known to a plant; remove it from the chain"
-    )
+    if isinstance(stage, stages.HeldLag):
+        return replace(path, held_lag=stage.time_constant)
+    assert isinstance(stage, stages.Hum)
+    sine, cosine = stage.amplitude * np.cos(stage.phase), stage.amplitude * np.sin(stage.phase)
+    return replace(path, hum=(*path.hum, (stage.frequency_hz, float(sine), float(cosine))))

@@ -27,8 +27,7 @@ class ActuatorDelay(AtInput, Effect):
 
     def apply(self, rig: Rig) -> Rig:
         self.require_positive("delay")
-        self.checked(rig)
-        return rig.with_chain(rig.chain.adding("actuators", Delay(self.location, self.delay)))
+        return self.with_stage(rig, Delay(self.location, self.delay))
 
     def explain(self, plant: Plant, survey: Survey) -> Plant:
         i = survey.input(self.location)

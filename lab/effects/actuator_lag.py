@@ -30,10 +30,9 @@ class ActuatorLag(AtInput, Effect):
 
     def apply(self, rig: Rig) -> Rig:
         self.require_positive("time_constant")
-        self.checked(rig)
         corner = 1 / (2 * math.pi * self.time_constant)
         stage = HeldLag(self.location, self.time_constant) if self.held else Lag(self.location, corner)
-        return rig.with_chain(rig.chain.adding("actuators", stage))
+        return self.with_stage(rig, stage)
 
     def explain(self, plant: Plant, survey: Survey) -> Plant:
         i = survey.input(self.location)

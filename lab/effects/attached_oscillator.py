@@ -11,7 +11,7 @@ import mujoco
 import numpy as np
 
 from identification.recording import Array
-from lab.effects.edits import body_element, numbers
+from lab.effects.edits import body_element, body_number, numbers
 from lab.effects.effect import AtBody, Effect
 from lab.effects.survey import Guess, Survey
 from lab.errors import LabError
@@ -42,8 +42,8 @@ class AttachedOscillator(AtBody, Effect):
     def apply(self, rig: Rig) -> Rig:
         self.require_positive("mass", "frequency_hz")
         self.require(self.location, rig.bodies, "body")
-        m, body = rig.model, rig.model.body(self.location)
-        joints = range(body.jntadr[0], body.jntadr[0] + body.jntnum[0])
+        m, body = rig.model, body_number(rig, self.location)
+        joints = range(m.body_jntadr[body], m.body_jntadr[body] + m.body_jntnum[body])
         slides = [j for j in joints if m.jnt_type[j] == int(mujoco.mjtJoint.mjJNT_SLIDE)]
         if not slides:
             raise LabError(
@@ -59,7 +59,7 @@ class AttachedOscillator(AtBody, Effect):
                 ET.SubElement(
                     child,
                     "joint",
-                    name=f"{name}.{m.joint(j).name}",
+                    name=f"{name}.{rig.dofs[j]}",
                     type="slide",
                     axis=numbers(m.jnt_axis[j]),
                     stiffness=number(stiffness),

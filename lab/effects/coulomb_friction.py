@@ -33,7 +33,7 @@ class CoulombFriction(Effect):
         self.require(self.location, self.places(rig), "joint or tendon")
         m = rig.model
         if self.location in rig.dofs:
-            present = float(m.dof_frictionloss[m.joint(self.location).dofadr[0]])
+            present = float(m.dof_frictionloss[rig.dofs.index(self.location)])
         else:
             present = float(m.tendon_frictionloss[rig.spring(self.location).index])
 

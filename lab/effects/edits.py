@@ -10,6 +10,7 @@ import numpy as np
 from lab.errors import RigError
 from lab.mjcf import number
 from lab.rig import Rig, Spring
+from lab.twin import movable
 
 Edit = Callable[[ET.Element], None]
 
@@ -42,9 +43,14 @@ def with_law(
     return rig.edited(edit)
 
 
+def body_number(rig: Rig, name: str) -> int:
+    """Number of a body that can move; one without a name in the MJCF is called after it."""
+    return movable(rig.model)[rig.bodies.index(name)]
+
+
 def with_mass(rig: Rig, name: str, factor: float) -> Rig:
     """The rig with the mass of one body, and its inertia with it, multiplied by a factor."""
-    m, body = rig.model, rig.model.body(name).id
+    m, body = rig.model, body_number(rig, name)
 
     def edit(root: ET.Element) -> None:
         element = body_element(root, name)
@@ -121,11 +127,12 @@ def numbers(values: Sequence[float] | np.ndarray) -> str:
 
 
 def _named(root: ET.Element, place: str, tags: Sequence[str], name: str) -> ET.Element:
-    for part in root.findall(place):
-        for tag in tags:
-            for element in part.iter(tag):
-                if element.get("name") == name:
-                    return element
+    found = [element for part in root.findall(place) for element in part.iter() if element.tag in tags]
+    # The world is body 0, and joints count from 0.
+    first = 1 if tags == ("body",) else 0
+    for number_, element in enumerate(found, start=first):
+        if name in (element.get("name"), f"{tags[0]}{number_}" if element.get("name") is None else None):
+            return element
     raise RigError(
         f"<{tags[0]} name={name!r}> stands nowhere in the MJCF as written (a replicated or attached element cannot be "
         "edited); write it out"

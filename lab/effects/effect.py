@@ -6,13 +6,16 @@ data that may have it.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, fields
+from dataclasses import dataclass, fields, replace
 from typing import Any, ClassVar
 
 from identification.recording import Channel
+from lab.chain import ALL, Stage
 from lab.effects.survey import Guess, Survey
 from lab.errors import LabError, UnknownNameError
+from lab.paths import ORDER
 from lab.plant import Plant
 from lab.rig import Rig
 
@@ -97,9 +100,9 @@ class Effect:
             LabError: one is not.
         """
         for name in names:
-            if not getattr(self, name) > 0:
+            if not 0 < getattr(self, name) < math.inf:
                 raise LabError(
-                    f"{self.cause} at {self.location!r}: {name} is {getattr(self, name)}; expected more than 0"
+                    f"{self.cause} at {self.location!r}: {name} is {getattr(self, name)}; expected a positive number"
                 )
 
 
@@ -124,34 +127,44 @@ class AtBody:
 class AtOutput:
     """Sits in an output channel."""
 
+    def with_stage(self: Any, rig: Rig, stage: Stage) -> Rig:
+        """The rig with one more stage behind the sensor of the channel."""
+        self.require(self.location, _names(rig.outputs), "output channel")
+        return _with_stage(rig, "sensors", stage)
+
     @classmethod
     def places(cls, rig: Rig) -> tuple[str, ...]:
         """Every connected output channel."""
         return _names(rig.outputs)
 
-    def checked(self: Any, rig: Rig) -> Any:
-        """The effect, once its channel is known to exist."""
-        self.require(self.location, _names(rig.outputs), "output channel")
-        return self
-
 
 class AtInput:
     """Sits in an input channel."""
+
+    def with_stage(self: Any, rig: Rig, stage: Stage) -> Rig:
+        """The rig with one more stage before the actuator of the channel."""
+        self.require(self.location, _names(rig.inputs), "input channel")
+        return _with_stage(rig, "actuators", stage)
 
     @classmethod
     def places(cls, rig: Rig) -> tuple[str, ...]:
         """Every connected input channel."""
         return _names(rig.inputs)
 
-    def checked(self: Any, rig: Rig) -> Any:
-        """The effect, once its channel is known to exist."""
-        self.require(self.location, _names(rig.inputs), "input channel")
-        return self
-
 
 def pairs(names: Sequence[str]) -> tuple[str, ...]:
     """Every pair of names in their order, joined by "|"."""
     return tuple(f"{a}|{b}" for i, a in enumerate(names) for b in names[i + 1 :])
+
+
+def _with_stage(rig: Rig, place: str, stage: Stage) -> Rig:
+    """The rig with a stage put where it belongs among those of its channel, whichever comes first."""
+    found, order = list(getattr(rig.chain, place)), ORDER[place]
+    later = order[order.index(stage.name) + 1 :]
+    behind = [i for i, s in enumerate(found) if s.name in later and s.channel in (stage.channel, ALL)]
+    found.insert(min(behind, default=len(found)), stage)
+    changed: dict[str, Any] = {place: tuple(found)}
+    return rig.with_chain(replace(rig.chain, **changed))
 
 
 def _names(channels: Sequence[Channel]) -> tuple[str, ...]:

@@ -36,10 +36,7 @@ class LineHum(AtOutput, Effect):
 
     def apply(self, rig: Rig) -> Rig:
         self.require_positive("frequency_hz")
-        self.checked(rig)
-        return rig.with_chain(
-            rig.chain.adding("sensors", Hum(self.location, self.frequency_hz, self.amplitude, self.phase))
-        )
+        return self.with_stage(rig, Hum(self.location, self.frequency_hz, self.amplitude, self.phase))
 
     def explain(self, plant: Plant, survey: Survey) -> Plant:
         i = survey.output(self.location)

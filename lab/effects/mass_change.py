@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 from typing import ClassVar
 
-from lab.effects.edits import with_mass
+from lab.effects.edits import body_number, with_mass
 from lab.effects.effect import EVERYWHERE, AtBody, Effect
 from lab.effects.survey import Survey
 from lab.errors import LabError
@@ -40,7 +40,7 @@ class MassChange(AtBody, Effect):
                 rig = with_mass(rig, body, self._positive(1 + float(self.relative_change or 0.0)))
             return rig
         self.require(self.location, rig.bodies, "body")
-        mass = float(rig.model.body(self.location).mass[0])
+        mass = float(rig.model.body_mass[body_number(rig, self.location)])
         return with_mass(rig, self.location, self._positive((mass + float(self.delta_mass or 0.0)) / mass))
 
     def explain(self, plant: Plant, survey: Survey) -> Plant:

@@ -10,12 +10,13 @@ from typing import ClassVar
 import mujoco
 import numpy as np
 
-from lab.effects.edits import body_element, fixed_tendon, numbers, with_tendon
+from lab.effects.edits import body_element, body_number, fixed_tendon, numbers, with_tendon
 from lab.effects.effect import Effect, pairs
 from lab.effects.survey import Guess, Survey
 from lab.errors import LabError
 from lab.mjcf import number
 from lab.plant import Plant
+from lab.ports import name_of
 from lab.rig import Rig
 from lab.twin import spring_rows
 
@@ -84,16 +85,17 @@ def _row_of(rig: Rig, location: str) -> np.ndarray:
 def _lone_slide(rig: Rig, body: str) -> tuple[str, np.ndarray] | None:
     """Name and world axis of the only joint between a body and the ground, if that is a slide."""
     m = rig.model
-    index = m.body(body).id
+    index = body_number(rig, body)
     if m.body_jntnum[index] != 1 or m.body_weldid[m.body_parentid[index]] != 0:
         return None
     joint = m.body_jntadr[index]
-    if m.jnt_type[joint] != int(mujoco.mjtJoint.mjJNT_SLIDE):
+    # A fixed tendon can only join joints that have names.
+    if m.jnt_type[joint] != int(mujoco.mjtJoint.mjJNT_SLIDE) or not m.joint(joint).name:
         return None
     data = mujoco.MjData(m)
     data.qpos[:] = rig.operating_point
     mujoco.mj_kinematics(m, data)
-    return m.joint(joint).name, data.xaxis[joint].copy()
+    return rig.dofs[joint], data.xaxis[joint].copy()
 
 
 def _straight(rig: Rig, a: str, b: str) -> ET.Element | None:
@@ -125,7 +127,7 @@ def _spatial(rig: Rig, a: str, b: str) -> tuple[Rig, ET.Element]:
     data = mujoco.MjData(rig.model)
     data.qpos[:] = rig.operating_point
     mujoco.mj_kinematics(rig.model, data)
-    length = float(np.linalg.norm(data.body(a).xpos - data.body(b).xpos))
+    length = float(np.linalg.norm(np.subtract(*(data.xpos[body_number(rig, body)] for body in (a, b)))))
     if length == 0:
         raise LabError(
             f"missing_spring at '{a}|{b}': the bodies share their origin, so the spring has no direction"
@@ -164,7 +166,7 @@ def _tied(rig: Rig) -> set[str]:
             ends = [m.jnt_bodyid[m.wrap_objid[w]] if fixed else m.site_bodyid[m.wrap_objid[w]] for w in wraps]
             if fixed and len(set(ends)) == 1:
                 ends.append(0)
-        names = {WORLD if m.body_weldid[body] == 0 else m.body(body).name for body in ends}
+        names = {WORLD if m.body_weldid[body] == 0 else name_of(m, "body", body) for body in ends}
         if len(names) == 2:
             found.add("|".join(sorted(names, key=order.index)))
     return found

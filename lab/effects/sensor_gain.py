@@ -25,8 +25,7 @@ class SensorGain(AtOutput, Effect):
     relative_change: float
 
     def apply(self, rig: Rig) -> Rig:
-        self.checked(rig)
-        return rig.with_chain(rig.chain.adding("sensors", Gain(self.location, self.relative_change)))
+        return self.with_stage(rig, Gain(self.location, self.relative_change))
 
     def explain(self, plant: Plant, survey: Survey) -> Plant:
         i = survey.output(self.location)

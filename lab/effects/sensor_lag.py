@@ -28,8 +28,7 @@ class SensorLag(AtOutput, Effect):
 
     def apply(self, rig: Rig) -> Rig:
         self.require_positive("corner_hz")
-        self.checked(rig)
-        return rig.with_chain(rig.chain.adding("sensors", Lag(self.location, self.corner_hz)))
+        return self.with_stage(rig, Lag(self.location, self.corner_hz))
 
     def explain(self, plant: Plant, survey: Survey) -> Plant:
         i = survey.output(self.location)

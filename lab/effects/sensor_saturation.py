@@ -27,8 +27,7 @@ class SensorSaturation(AtOutput, Effect):
 
     def apply(self, rig: Rig) -> Rig:
         self.require_positive("limit")
-        self.checked(rig)
-        return rig.with_chain(rig.chain.adding("sensors", Saturation(self.location, self.limit)))
+        return self.with_stage(rig, Saturation(self.location, self.limit))
 
     def explain(self, plant: Plant, survey: Survey) -> Plant:
         i = survey.output(self.location)

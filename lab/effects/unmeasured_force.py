@@ -8,6 +8,7 @@ from dataclasses import dataclass, replace
 from typing import Any, ClassVar
 
 from lab.chain import Hum, Noise
+from lab.effects.edits import body_number
 from lab.effects.effect import AtBody, Effect
 from lab.effects.survey import Guess, Survey
 from lab.errors import LabError
@@ -54,8 +55,8 @@ class UnmeasuredForce(AtBody, Effect):
     @staticmethod
     def _at(rig: Rig, location: str) -> tuple[str, ...]:
         """Joints of a body."""
-        body = rig.model.body(location)
-        return rig.dofs[body.jntadr[0] : body.jntadr[0] + body.jntnum[0]]
+        m, body = rig.model, body_number(rig, location)
+        return rig.dofs[m.body_jntadr[body] : m.body_jntadr[body] + m.body_jntnum[body]]
 
     def explain(self, plant: Plant, survey: Survey) -> Plant:
         dof = self.dof or self._at(survey.rig, self.location)[0]
