@@ -6,12 +6,19 @@ from collections.abc import Iterable, Sequence
 from dataclasses import replace
 
 import numpy as np
+import scipy.linalg
 
 from identification.horizon import resonance_peaks
 from identification.peaks import find_peaks
-from identification.plscf import plscf, response_rank
+from identification.plscf import default_degree, plscf, response_rank
 from identification.recording import Recording
-from identification.spectra import FrequencyResponse, frequency_response, positive_spectra, unit_sizes
+from identification.spectra import (
+    FrequencyResponse,
+    cross_spectra,
+    frequency_response,
+    positive_spectra,
+    unit_sizes,
+)
 from identification.systems import Realization
 
 LEFT = {"measured": 1e-3, "calculated": 1e-12}
@@ -27,7 +34,10 @@ LINE_VALUES = 60
 """Squared responses averaged to tell a resonance from chance."""
 
 MARGIN = 2.0
-"""Upper edge of the band fitted, over the frequency where the highest resonance has faded."""
+"""Upper edge of the band fitted, over the frequency of the highest peak and over that where it has faded."""
+
+MAX_REFERENCES = 8
+"""Outputs taken as references unless told otherwise; more of them leave a lower degree to each."""
 
 
 def plscf_recording(
@@ -58,7 +68,8 @@ def plscf_recording(
         estimator: as for `frequency_response`; of no account without forces.
         n_segment: likewise.
         decay: rate of the exponential window [1/s], which is undone in the models.
-        references: names of the reference outputs; of no account with forces.
+        references: names of the reference outputs; of no account with forces. When None all, or eight that see
+            most of the motion.
         n_lags: lags of the output correlations; likewise.
 
     Raises:
@@ -67,20 +78,19 @@ def plscf_recording(
     Source: Peeters, Van der Auweraer, Guillaume and Leuridan (2004), Shock Vib. 11, 395-409; for outputs
         alone Peeters and Van der Auweraer (2005), Proc. 1st IOMAC.
     """
-    peaks = resonance_peaks(recording)
     forced = bool(recording.inputs) and all(record.inputs.shape[0] for record in recording.records)
     if forced:
-        response = _forced_response(recording, estimator, n_segment, decay)
+        response, why = _forced_response(recording, estimator, n_segment, decay), "as asked for"
+        if band is None and response_rank(response) is None:
+            band, why = resonance_band(response), "no resonance lies above"
     else:
-        response = _output_response(recording, peaks, references, n_lags, decay)
+        peaks = resonance_peaks(recording)
+        response, why = _output_response(recording, peaks, references, n_lags, decay), "as asked for"
+        if band is None:
+            band, why = _peak_band(response, peaks)
     notes = response.notes
-    if band is None and (not forced or response_rank(response) is None):
-        band = resonance_band(response)
-        if band is not None:
-            notes = (
-                *notes,
-                f"Lines from {band[0]:.4g} to {band[1]:.4g} Hz are fitted: no resonance lies above.",
-            )
+    if band is not None:
+        notes = (*notes, f"Lines from {band[0]:.4g} to {band[1]:.4g} Hz are fitted: {why}.")
     found = plscf(response, order, orders=orders, degree=degree, band=band)
     settings = {**found.settings, "decay": response.decay}
     if forced:
@@ -133,8 +143,26 @@ def _output_response(
     if decay is None:
         decay = 4.0 / (n_lags * recording.dt)
         notes = (*notes, "An exponential window takes them down to 2 % at the last lag; it is undone.")
+    if references is None and len(recording.outputs) > MAX_REFERENCES:
+        references = spread_references(recording, MAX_REFERENCES)
+        notes = (
+            *notes,
+            f"The references are {', '.join(references)}, which together see most of the motion.",
+        )
     response = positive_spectra(recording, n_lags, references=references, decay=decay)
     return replace(response, notes=notes)
+
+
+def spread_references(recording: Recording, n: int) -> tuple[str, ...]:
+    """Names of the n outputs whose cross-spectra with all outputs leave least of the others unexplained.
+
+    Source: Businger and Golub (1965), Numer. Math. 7, 269-276, the pivots of an orthogonal factorization.
+    """
+    spectra = cross_spectra(recording)
+    size = unit_sizes(np.einsum("foo->o", spectra.values).real, recording.outputs)
+    G = spectra.values / size[:, None] / size
+    _, pivots = scipy.linalg.qr(G.reshape(-1, size.size), mode="r", pivoting=True)
+    return tuple(recording.outputs[k].name for k in pivots[:n])
 
 
 def resonance_band(response: FrequencyResponse) -> tuple[float, float] | None:
@@ -150,6 +178,28 @@ def resonance_band(response: FrequencyResponse) -> tuple[float, float] | None:
     low = 0.0 if f[0] < 0.1 * f[-1] else float(f[0])
     high = min(MARGIN * _last_fall(response), float(f[-1]))
     return None if high > 0.8 * nyquist and low == 0 else (low, high)
+
+
+def _peak_band(response: FrequencyResponse, peaks: Sequence[float]) -> tuple[tuple[float, float] | None, str]:
+    """From zero to above the resonance peaks, as far as the lowest one can be told from drift; and the reason.
+
+    A degree spans a sample of twice the upper edge, and half a period of the lowest resonance takes as many
+    of them as the edge is higher than it.
+    """
+    faded, nyquist = resonance_band(response), 0.5 / response.dt
+    if not peaks:
+        return faded, "no resonance lies above"
+    wanted = max(MARGIN * peaks[-1], nyquist if faded is None else faded[1])
+    reach = default_degree(response.frequency_hz.size, len(response.inputs)) * peaks[0]
+    high = min(wanted, reach)
+    if high > 0.8 * nyquist:
+        return None, ""
+    if high < 1.1 * peaks[-1]:
+        return (0.0, high), (
+            f"the polynomial does not reach further from the peak at {peaks[0]:.4g} Hz; for the peaks up to "
+            f"{peaks[-1]:.4g} Hz give another `band`"
+        )
+    return (0.0, high), "no resonance lies above"
 
 
 def _last_fall(response: FrequencyResponse) -> float:

@@ -190,7 +190,7 @@ def _highest_degree(n_f: int, n_inputs: int, degree: int | None, asked: list[int
         raise OrderError(f"order {min(asked)} was asked for; expected at least 1")
     if degree is None:
         needed = -(-wanted // n_inputs)
-        degree = max(min(MAX_DEGREE, MAX_ORDER // n_inputs, n_f // 2), needed, 1)
+        degree = max(default_degree(n_f, n_inputs), needed)
     if degree + 1 > n_f:
         raise TooShortError(
             f"{n_f} lines cannot carry polynomials of degree {degree}; widen the band, take longer pieces "
@@ -202,6 +202,11 @@ def _highest_degree(n_f: int, n_inputs: int, degree: int | None, asked: list[int
             f"{n_inputs} inputs; lower the order or raise the degree"
         )
     return degree
+
+
+def default_degree(n_lines: int, n_inputs: int) -> int:
+    """Highest degree that lines and bounds allow."""
+    return max(min(MAX_DEGREE, MAX_ORDER // n_inputs, n_lines // 2), 1)
 
 
 def _degrees(orders: list[int], n_inputs: int, highest: int) -> list[int]:

@@ -11,13 +11,14 @@ from hypothesis import strategies as st
 from identification import denominator
 from identification.denominator import coefficients, reduced_factor, zeros
 from identification.errors import OrderError, TooShortError
-from identification.frequency_domain import plscf_recording, resonance_band
+from identification.frequency_domain import plscf_recording, resonance_band, spread_references
 from identification.modes import mac
 from identification.plscf import plscf, response_rank
 from identification.recording import Channel, Record, Recording
 from identification.second_order import second_order
 from identification.spectra import FrequencyResponse, frequency_response, positive_spectra
 from identification.stability import stabilize
+from identification.systems import SecondOrder
 from tests import systems
 
 CHAIN7 = systems.instrumented(
@@ -282,6 +283,33 @@ def test_a_band_holds_its_own_modes():
     # The modes outside act through the poles at the edges, an approximation that gets better with the degree.
     np.testing.assert_allclose(inside.frequency_hz, truth.frequency_hz[1:4], rtol=1e-4)
     np.testing.assert_allclose(inside.damping_ratio, truth.damping_ratio[1:4], rtol=1e-2)
+
+
+def test_references_are_spread_over_what_moves_differently():
+    recording = ambient(systems.chain7(), 0.02, 10_000, 16)
+    record = recording.records[0]
+    twice = Recording(
+        (replace(record, outputs=np.vstack([record.outputs, 0.9 * record.outputs])),),
+        (),
+        (*recording.outputs, *(replace(c, name=f"copy of {c.name}") for c in recording.outputs)),
+        recording.sample_rate,
+    )
+    # A copy explains nothing that its original leaves; the larger of the two comes first.
+    assert set(spread_references(twice, 7)) == {channel.name for channel in recording.outputs}
+    assert "The references are" in " ".join(plscf_recording(twice).notes)
+
+
+def test_modes_far_apart_take_a_band_each():
+    stiffness = (2 * np.pi * np.array([0.5, 40.0])) ** 2
+    damping = 2 * 0.01 * np.sqrt(stiffness)
+    structure = SecondOrder(np.eye(2), np.diag(damping), np.diag(stiffness), ("slow", "fast"))
+    recording = ambient(structure, 0.01, 100_000, 17)
+    low, high = plscf_recording(recording), plscf_recording(recording, band=(25.0, 50.0))
+    assert "give another `band`" in " ".join(low.notes)
+    for found, mode in ((low, 0), (high, 1)):
+        nearest = np.min(np.abs(stabilize(found).modes.frequency_hz / [0.5, 40.0][mode] - 1))
+        # 500 periods at one per cent of damping: the frequency is known to 0.2 % of itself, here three times.
+        assert nearest < 6e-3
 
 
 # --- Properties
