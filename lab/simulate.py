@@ -217,15 +217,15 @@ class _Bench:
 
     def _planned(self, asked: float | None) -> _Bench:
         """The bench with substeps that reach the accuracy, as measured on the start of its first records."""
-        dt = 1 / self.sample_rate
+        dt, duration = 1 / self.sample_rate, self.loads[0].n_samples / self.sample_rate
         pilots, growth = self._pilots()
         accuracy = IDEAL_ACCURACY if asked is None else asked
         if asked is None and self.rig.chain.acquisition:
-            coarse = self._with(stepping.first_guess(self.rig, dt, 1e-4))
+            coarse = self._with(stepping.first_guess(self.rig, dt, 1e-4, duration))
             outputs = [part.outputs for part in coarse.batch(pilots, None)]
             accuracy = self._default_accuracy(np.concatenate(outputs, axis=2))
         finest = FINEST if asked is not None else FINEST_UNASKED
-        best = plan = self._measured(stepping.first_guess(self.rig, dt, accuracy), pilots, growth)
+        best = plan = self._measured(stepping.first_guess(self.rig, dt, accuracy, duration), pilots, growth)
         in_vain = 0
         # Rounding puts a floor under the error: two finer plans that are hardly better have met it.
         while best.error > accuracy and plan.substeps < finest and in_vain < 2:
@@ -253,7 +253,8 @@ class _Bench:
         return starts, max(1.0, min(settled, whole) / n)
 
     def _measured(self, plan: Plan, pilots: Sequence[Load], growth: float) -> Plan:
-        return replace(plan, error=growth * self._error(plan, pilots))
+        # What extrapolation leaves of an error in phase grows with its square.
+        return replace(plan, error=growth ** (2 if plan.cancelled else 1) * self._error(plan, pilots))
 
     def _with(self, plan: Plan) -> _Bench:
         return replace(self, plan=plan)

@@ -85,13 +85,14 @@ def delays(rig: Rig) -> list[float]:
     return [s.delay for s in (*rig.chain.actuators, *rig.chain.sensors) if isinstance(s, Delay)]
 
 
-def first_guess(rig: Rig, dt: float, accuracy: float) -> Plan:
+def first_guess(rig: Rig, dt: float, accuracy: float, duration: float) -> Plan:
     """A plan from theory.
 
     Args:
         rig: the rig.
         dt: sample time [s].
         accuracy: relative error wanted.
+        duration: of the record [s].
     """
     phase = highest_frequency(rig) * dt
     at_least = max(int(np.ceil(phase / 2)), 1)
@@ -99,8 +100,10 @@ def first_guess(rig: Rig, dt: float, accuracy: float) -> Plan:
     cancelled = cancellable(rig, dt)
     if not cancelled or (plain <= 16 and not rig.chain.needs_substeps):
         return aligned(Plan(plain), dt, delays(rig))
-    # The coarsest of the three runs must still be stable.
-    fine = max(4 * at_least, int(np.ceil(phase * (0.1 / accuracy) ** (1 / 6))))
+    # The coarsest of the three runs must still be stable, and not out of phase by more than a tenth of a radian.
+    turns = phase * min(duration, settling_time(rig)) / dt
+    in_phase = phase * (turns / 120 / 0.1) ** (1 / 4)
+    fine = max(4 * at_least, 4 * int(np.ceil(in_phase)), int(np.ceil(phase * (0.1 / accuracy) ** (1 / 6))))
     return Plan(4 * -(-fine // 4), cancelled)
 
 
