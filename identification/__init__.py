@@ -25,13 +25,31 @@ if TYPE_CHECKING:
         RecordingError,
         TooShortError,
     )
+    from identification.fdd import fdd
+    from identification.frequency_domain import plscf_recording
     from identification.identify import Identification, identify
+    from identification.lsfd import lsfd
     from identification.methods import METHODS
-    from identification.modes import Modes, mac, modal_phase_collinearity
+    from identification.modal_scaling import modal_scaling
+    from identification.modes import (
+        Modes,
+        auto_mac,
+        comac,
+        cross_orthogonality,
+        mac,
+        mean_phase,
+        mean_phase_deviation,
+        modal_phase_collinearity,
+        real_shapes,
+    )
+    from identification.next_era import next_era
     from identification.okid import okid, okid_era
+    from identification.plscf import plscf
     from identification.pulse import markov_parameters
     from identification.recording import Channel, Record, Recording
+    from identification.response import FrequencyResponse
     from identification.second_order import second_order
+    from identification.spectra import cross_spectra, frequency_response, positive_spectra
     from identification.ssi import ssi_cov
     from identification.ssi_data import ssi_data
     from identification.stability import Stabilization, stabilize
@@ -49,7 +67,29 @@ _MODULES = {
     ),
     "identify": ("Identification", "identify"),
     "methods": ("METHODS",),
-    "modes": ("Modes", "mac", "modal_phase_collinearity"),
+    "modes": (
+        "Modes",
+        "auto_mac",
+        "comac",
+        "cross_orthogonality",
+        "mac",
+        "mean_phase",
+        "mean_phase_deviation",
+        "modal_phase_collinearity",
+        "real_shapes",
+    ),
+    "fdd": ("fdd",),
+    "frequency_domain": ("plscf_recording",),
+    "lsfd": ("lsfd",),
+    "modal_scaling": ("modal_scaling",),
+    "next_era": ("next_era",),
+    "plscf": ("plscf",),
+    "response": ("FrequencyResponse",),
+    "spectra": (
+        "cross_spectra",
+        "frequency_response",
+        "positive_spectra",
+    ),
     "okid": ("okid", "okid_era"),
     "pulse": ("markov_parameters",),
     "recording": ("Channel", "Record", "Recording"),
@@ -64,6 +104,7 @@ _WHERE = {name: module for module, names in _MODULES.items() for name in names}
 __all__ = [
     "METHODS",
     "Channel",
+    "FrequencyResponse",
     "Identification",
     "IdentificationError",
     "MarkovParameters",
@@ -78,15 +119,30 @@ __all__ = [
     "Stabilization",
     "StateSpace",
     "TooShortError",
+    "auto_mac",
+    "comac",
+    "cross_orthogonality",
+    "cross_spectra",
     "era",
     "era_dc",
+    "fdd",
+    "frequency_response",
     "identify",
+    "lsfd",
     "mac",
     "markov_parameters",
+    "mean_phase",
+    "mean_phase_deviation",
     "modal_phase_collinearity",
+    "modal_scaling",
+    "next_era",
     "okid",
     "okid_era",
     "output_covariances",
+    "plscf",
+    "plscf_recording",
+    "positive_spectra",
+    "real_shapes",
     "second_order",
     "ssi_cov",
     "ssi_data",

@@ -12,8 +12,8 @@ from identification.horizon import resonance_peaks
 from identification.peaks import find_peaks
 from identification.plscf import default_degree, plscf, response_rank
 from identification.recording import Recording
+from identification.response import FrequencyResponse
 from identification.spectra import (
-    FrequencyResponse,
     cross_spectra,
     frequency_response,
     positive_spectra,

@@ -13,7 +13,7 @@ from identification.errors import IdentificationError, TooShortError
 from identification.modal_form import modal_outputs, modal_states
 from identification.modes import Modes
 from identification.recording import DERIVATIVE, Array, Channel
-from identification.spectra import FrequencyResponse
+from identification.response import FrequencyResponse
 from identification.systems import StateSpace
 
 Complex = NDArray[np.complex128]

@@ -19,7 +19,8 @@ from identification.errors import OrderError, TooShortError
 from identification.lsfd import fit_outputs, line_weights
 from identification.modal_form import modal_gains, modal_states, widths
 from identification.recording import Array
-from identification.spectra import FrequencyResponse, unit_sizes
+from identification.response import FrequencyResponse
+from identification.spectra import unit_sizes
 from identification.systems import Realization, StateSpace
 
 Complex = NDArray[np.complex128]

@@ -6,7 +6,8 @@ import pytest
 from identification.errors import IdentificationError, TooShortError
 from identification.lsfd import lsfd
 from identification.modes import mac
-from identification.spectra import FrequencyResponse, frequency_response
+from identification.response import FrequencyResponse
+from identification.spectra import frequency_response
 from tests import systems
 
 QUANTITIES = ["displacement", "velocity", "acceleration"]

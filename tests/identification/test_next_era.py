@@ -1,11 +1,11 @@
 """NExT-ERA on exact covariances, on noisy sensors, and beside another reading of the same covariances."""
 
+import sys
 from dataclasses import replace
 
 import numpy as np
 import pytest
 
-from identification import next_era as module
 from identification.errors import OrderError, RecordingError
 from identification.modes import mac
 from identification.next_era import next_era
@@ -35,7 +35,7 @@ def test_exact_covariances_give_back_poles_and_shapes_and_lag_zero_is_never_aske
         assert first_lag == 1
         return truth.markov(n_lags + 1).values[1:]  # C A^{k-1} G with G = B
 
-    monkeypatch.setattr(module, "output_covariances", covariances)
+    monkeypatch.setattr(sys.modules[next_era.__module__], "output_covariances", covariances)
     found = next_era(recording, 14, n_rows=30, references=["acceleration_x2", "acceleration_x5"])
     modes, expected = found.system.modes(), truth.modes()
     # Rounding, times the condition of the Hankel matrix.

@@ -15,8 +15,9 @@ from identification.frequency_domain import plscf_recording, resonance_band, spr
 from identification.modes import mac
 from identification.plscf import plscf, response_rank
 from identification.recording import Channel, Record, Recording
+from identification.response import FrequencyResponse
 from identification.second_order import second_order
-from identification.spectra import FrequencyResponse, frequency_response, positive_spectra
+from identification.spectra import frequency_response, positive_spectra
 from identification.stability import stabilize
 from identification.systems import SecondOrder
 from tests import systems
