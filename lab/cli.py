@@ -200,6 +200,9 @@ def view_command(folder: Path) -> None:
 def main(arguments: Sequence[str] | None = None) -> NoReturn:
     """Run one command and exit: 0 done, 1 a fault of the lab's own, 2 the input is at fault."""
     signal.signal(signal.SIGTERM, _stop)
+    # Matrices here are small: threads cost more than they bring, and sums must not depend on the number of cores.
+    for library in ("OMP", "OPENBLAS", "MKL"):
+        os.environ.setdefault(f"{library}_NUM_THREADS", "1")
     typed = list(sys.argv[1:] if arguments is None else arguments)
     try:
         cli.main(typed, prog_name="lab", standalone_mode=False, obj=shlex.join(["lab", *typed]))

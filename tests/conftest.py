@@ -4,6 +4,10 @@ import os
 
 from hypothesis import settings
 
+# Matrices here are small: threads cost more than they bring, tenfold where other work shares the cores.
+for library in ("OMP", "OPENBLAS", "MKL"):
+    os.environ.setdefault(f"{library}_NUM_THREADS", "1")
+
 # Rerun takes bad arguments with a mere warning unless told to be strict.
 os.environ.setdefault("RERUN_STRICT", "1")
 
