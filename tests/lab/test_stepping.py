@@ -1,6 +1,7 @@
 """Time steps: aligned with their readings, of the order that theory promises, alike on any number of threads."""
 
 import os
+import runpy
 import xml.etree.ElementTree as ET
 
 import numpy as np
@@ -12,7 +13,7 @@ from lab import stepping
 from lab.errors import DivergedError
 from lab.rig import Rig
 from lab.stepping import Plan, Stepper
-from tests.lab.structures import LINEAR, chain_xml, held_response, model, moving, oscillator
+from tests.lab.structures import LINEAR, MODELS, chain_xml, held_response, model, moving, oscillator
 
 THREE = chain_xml([1.0, 2.0, 0.5], [(50.0, 0.3)] * 3, {(0, 1): (20.0, 0.1), (1, 2): (30.0, 0.2)})
 
@@ -134,7 +135,7 @@ def test_highest_frequency_and_settling_time_of_one_mass():
 @pytest.mark.parametrize("accuracy", [1e-3, 1e-6, 1e-9, 1e-12])
 def test_first_guess_is_stable_and_near(accuracy):
     for name, (rate, _) in LINEAR.items():
-        plan = stepping.first_guess(model(name), 1 / rate, accuracy)
+        plan = stepping.first_guess(model(name), 1 / rate, accuracy, 60.0)
         phase = stepping.highest_frequency(model(name)) / rate / plan.runs[-1]
         # RK4 is stable up to ω h = 2.78 on the imaginary axis.
         assert phase < 2.7
@@ -267,3 +268,34 @@ def test_divergence_is_noticed_where_mujoco_does_not_reset():
     run = stepper(Rig.from_xml(unstable), 0.1, 1, velocity=[[1.0]])
     with pytest.raises(DivergedError, match="diverged near"):
         run.advance(np.zeros((1, 1, 3000)), None)
+
+
+# The benchmark.
+
+
+def test_the_benchmark_prints_errors_and_costs(capsys):
+    path = MODELS.parent / "benchmarks" / "simulation.py"
+    tiny = [
+        "--models",
+        "chain3_coupled",
+        "--samples",
+        "40",
+        "--substeps",
+        "4",
+        "--steps",
+        "50",
+        "--repeats",
+        "1",
+    ]
+    runpy.run_path(str(path))["main"](tiny)
+    rows = [
+        line.split() for line in capsys.readouterr().out.splitlines() if line.startswith("chain3_coupled")
+    ]
+    *errors, costs = rows
+    assert [int(row[1]) for row in errors] == [1, 2, 4, 8]
+    plain = np.array([float(row[3]) for row in errors])
+    # Printed with two digits.
+    np.testing.assert_allclose(plain[:-1] / plain[1:], 16, rtol=0.15)
+    assert [len(row) for row in errors] == [4, 4, 5, 5]
+    assert all(float(value) > 0 for value in costs[1:])
+    assert len(costs) == 8
