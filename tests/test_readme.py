@@ -29,7 +29,7 @@ def test_the_python_lines_run(monkeypatch, capsys):
 
 def test_the_checks_run_the_test_command():
     tests = [block.strip() for block in blocks("sh") if "pytest" in block]
-    assert tests == [".venv/bin/pytest"]
+    assert tests == [".venv/bin/pytest -n auto"]
     assert tests[0] in (ROOT / ".ci/run").read_text("utf-8").splitlines()
 
 
