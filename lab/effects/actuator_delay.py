@@ -25,7 +25,7 @@ class ActuatorDelay(AtInput, Effect):
     positive: ClassVar[tuple[str, ...]] = ("delay",)
     delay: float
 
-    def apply(self, rig: Rig) -> Rig:
+    def hide(self, rig: Rig) -> Rig:
         self.require_positive("delay")
         return self.with_stage(rig, Delay(self.location, self.delay))
 

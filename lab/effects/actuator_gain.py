@@ -24,7 +24,7 @@ class ActuatorGain(AtInput, Effect):
     units: ClassVar[dict[str, str]] = {"relative_change": "1"}
     relative_change: float
 
-    def apply(self, rig: Rig) -> Rig:
+    def hide(self, rig: Rig) -> Rig:
         return self.with_stage(rig, Gain(self.location, self.relative_change))
 
     def explain(self, plant: Plant, survey: Survey) -> Plant:

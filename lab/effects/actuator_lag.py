@@ -28,7 +28,7 @@ class ActuatorLag(AtInput, Effect):
     time_constant: float
     held: bool = False
 
-    def apply(self, rig: Rig) -> Rig:
+    def hide(self, rig: Rig) -> Rig:
         self.require_positive("time_constant")
         corner = 1 / (2 * math.pi * self.time_constant)
         stage = HeldLag(self.location, self.time_constant) if self.held else Lag(self.location, corner)

@@ -39,7 +39,7 @@ class AttachedOscillator(AtBody, Effect):
     frequency_hz: float
     damping_ratio: float = 0.0
 
-    def apply(self, rig: Rig) -> Rig:
+    def hide(self, rig: Rig) -> Rig:
         self.require_positive("mass", "frequency_hz")
         self.require(self.location, rig.bodies, "body")
         m, body = rig.model, body_number(rig, self.location)

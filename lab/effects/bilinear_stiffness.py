@@ -26,7 +26,7 @@ class BilinearStiffness(AtSpring, Effect):
     units: ClassVar[dict[str, str]] = {"relative_change_in_extension": "1"}
     relative_change_in_extension: float
 
-    def apply(self, rig: Rig) -> Rig:
+    def hide(self, rig: Rig) -> Rig:
         spring = rig.spring(self.location)
         k = law_of(rig, spring)[0][0]
         return one_sided(

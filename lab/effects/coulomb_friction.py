@@ -28,7 +28,7 @@ class CoulombFriction(Effect):
     positive: ClassVar[tuple[str, ...]] = ("force",)
     force: float
 
-    def apply(self, rig: Rig) -> Rig:
+    def hide(self, rig: Rig) -> Rig:
         self.require_positive("force")
         self.require(self.location, self.places(rig), "joint or tendon")
         m = rig.model

@@ -25,7 +25,7 @@ class CubicStiffness(AtSpring, Effect):
     units: ClassVar[dict[str, str]] = {"k3": "N/m^3"}
     k3: float
 
-    def apply(self, rig: Rig) -> Rig:
+    def hide(self, rig: Rig) -> Rig:
         k, k2, k3 = law_of(rig, rig.spring(self.location))[0]
         return with_law(rig, self.location, stiffness=[k, k2, k3 + self.k3])
 

@@ -8,6 +8,7 @@ from typing import ClassVar
 from lab.effects.edits import law_of, with_law
 from lab.effects.effect import EVERYWHERE, AtSpring, Effect
 from lab.effects.survey import Survey
+from lab.errors import LabError
 from lab.plant import Plant
 from lab.rig import Rig
 
@@ -24,7 +25,12 @@ class DampingChange(AtSpring, Effect):
     units: ClassVar[dict[str, str]] = {"relative_change": "1"}
     relative_change: float
 
-    def apply(self, rig: Rig) -> Rig:
+    def hide(self, rig: Rig) -> Rig:
+        if self.relative_change < -1:
+            raise LabError(
+                f"damping_change at {self.location!r}: relative_change is {self.relative_change}; expected -1 or more; -1 "
+                "leaves nothing"
+            )
         names = self.places(rig) if self.location == EVERYWHERE else (self.location,)
         for name in names:
             law = law_of(rig, rig.spring(name))[1]

@@ -45,6 +45,15 @@ class Effect:
             UnknownNameError: the location does not exist.
             LabError: the size is impossible.
         """
+        for name, value in self.parameters.items():
+            if not math.isfinite(value):
+                raise LabError(
+                    f"{self.cause} at {self.location!r}: {name} is {value}; expected a finite number"
+                )
+        return self.hide(rig)
+
+    def hide(self, rig: Rig) -> Rig:
+        """What `apply` does with numbers that are finite."""
         raise NotImplementedError
 
     def explain(self, plant: Plant, survey: Survey) -> Plant:

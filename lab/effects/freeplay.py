@@ -26,7 +26,7 @@ class Freeplay(AtSpring, Effect):
     positive: ClassVar[tuple[str, ...]] = ("half_gap",)
     half_gap: float
 
-    def apply(self, rig: Rig) -> Rig:
+    def hide(self, rig: Rig) -> Rig:
         self.require_positive("half_gap")
         spring = rig.spring(self.location)
         law = law_of(rig, spring)[0]

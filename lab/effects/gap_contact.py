@@ -28,7 +28,7 @@ class GapContact(AtSpring, Effect):
     gap: float
     contact_stiffness: float
 
-    def apply(self, rig: Rig) -> Rig:
+    def hide(self, rig: Rig) -> Rig:
         self.require_positive("contact_stiffness")
         spring = rig.spring(self.location)
         side = 1 if self.gap >= 0 else -1

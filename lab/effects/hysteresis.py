@@ -29,7 +29,7 @@ class Hysteresis(AtSpring, Effect):
     stiffness: float
     yield_displacement: float
 
-    def apply(self, rig: Rig) -> Rig:
+    def hide(self, rig: Rig) -> Rig:
         self.require_positive("stiffness", "yield_displacement")
         return laws.with_hysteresis(rig, rig.spring(self.location), self.stiffness, self.yield_displacement)
 

@@ -34,7 +34,7 @@ class LineHum(AtOutput, Effect):
     amplitude: float
     phase: float = 0.0
 
-    def apply(self, rig: Rig) -> Rig:
+    def hide(self, rig: Rig) -> Rig:
         self.require_positive("frequency_hz")
         return self.with_stage(rig, Hum(self.location, self.frequency_hz, self.amplitude, self.phase))
 

@@ -27,7 +27,7 @@ class MassChange(AtBody, Effect):
     delta_mass: float | None = None
     relative_change: float | None = None
 
-    def apply(self, rig: Rig) -> Rig:
+    def hide(self, rig: Rig) -> Rig:
         if (self.relative_change is None) == (self.delta_mass is None) or (
             (self.location == EVERYWHERE) != (self.delta_mass is None)
         ):

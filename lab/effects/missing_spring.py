@@ -39,7 +39,7 @@ class MissingSpring(Effect):
     stiffness: float
     damping: float = 0.0
 
-    def apply(self, rig: Rig) -> Rig:
+    def hide(self, rig: Rig) -> Rig:
         a, _, b = self.location.partition("|")
         for name in (a, b):
             self.require(name, (WORLD, *rig.bodies), "body")

@@ -25,7 +25,7 @@ class QuadraticDamping(AtSpring, Effect):
     units: ClassVar[dict[str, str]] = {"c2": "N s^2/m^2"}
     c2: float
 
-    def apply(self, rig: Rig) -> Rig:
+    def hide(self, rig: Rig) -> Rig:
         c, c2, c3 = law_of(rig, rig.spring(self.location))[1]
         return with_law(rig, self.location, damping=[c, c2 + self.c2, c3])
 

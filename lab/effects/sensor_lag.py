@@ -26,7 +26,7 @@ class SensorLag(AtOutput, Effect):
     positive: ClassVar[tuple[str, ...]] = ("corner_hz",)
     corner_hz: float
 
-    def apply(self, rig: Rig) -> Rig:
+    def hide(self, rig: Rig) -> Rig:
         self.require_positive("corner_hz")
         return self.with_stage(rig, Lag(self.location, self.corner_hz))
 

@@ -25,7 +25,7 @@ class SensorSaturation(AtOutput, Effect):
     positive: ClassVar[tuple[str, ...]] = ("limit",)
     limit: float
 
-    def apply(self, rig: Rig) -> Rig:
+    def hide(self, rig: Rig) -> Rig:
         self.require_positive("limit")
         return self.with_stage(rig, Saturation(self.location, self.limit))
 

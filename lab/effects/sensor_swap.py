@@ -7,6 +7,7 @@ from typing import ClassVar
 
 from lab.effects.effect import Effect, pairs
 from lab.effects.survey import Guess, Survey
+from lab.errors import LabError
 from lab.plant import Plant
 from lab.rig import Rig
 
@@ -17,10 +18,14 @@ class SensorSwap(Effect):
 
     cause: ClassVar[str] = "sensor_swap"
 
-    def apply(self, rig: Rig) -> Rig:
+    def hide(self, rig: Rig) -> Rig:
         a, _, b = self.location.partition("|")
         for name in (a, b):
             self.require(name, [channel.name for channel in rig.outputs], "output channel")
+        if f"{a}|{b}" not in self.places(rig) and f"{b}|{a}" not in self.places(rig):
+            raise LabError(
+                f"sensor_swap at {self.location!r}: expected two different channels of the same unit"
+            )
         return rig.with_chain(replace(rig.chain, swaps=(*rig.chain.swaps, (a, b))))
 
     def explain(self, plant: Plant, survey: Survey) -> Plant:

@@ -25,7 +25,7 @@ class StiffnessDrift(AtSpring, Effect):
     units: ClassVar[dict[str, str]] = {"relative_change_over_record": "1"}
     relative_change_over_record: float
 
-    def apply(self, rig: Rig) -> Rig:
+    def hide(self, rig: Rig) -> Rig:
         spring = rig.spring(self.location)
         k = law_of(rig, spring)[0][0]
         return laws.with_drift(rig, spring, k * self.relative_change_over_record)

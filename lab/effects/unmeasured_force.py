@@ -36,7 +36,7 @@ class UnmeasuredForce(AtBody, Effect):
     rms: float | None = None
     dof: str | None = None
 
-    def apply(self, rig: Rig) -> Rig:
+    def hide(self, rig: Rig) -> Rig:
         self.require(self.location, rig.bodies, "body")
         joints = self._at(rig, self.location)
         dof = joints[0] if self.dof is None and joints else self.dof
