@@ -57,7 +57,7 @@ def run(
         recording = load(folder / "recording.h5")
         chosen = scenario.identification
         result = examine(recording, chosen.method, order=chosen.order, dofs=touched(rig), **chosen.settings)
-        result = replace(held_against(rig, result, scenario), title=scenario.title)
+        result = replace(held_against(truth_of(scenario, rig), result, scenario), title=scenario.title)
         present(folder, result, recording, scenario=scenario, rig=rig, command=command)
     return result
 
@@ -94,7 +94,16 @@ def identify_file(
 
 
 def rig_of(scenario: Scenario) -> Rig:
-    """The rig that a scenario describes, its instruments on and its channels connected."""
+    """The rig that a scenario describes: its effects hidden, its instruments on and its channels connected."""
+    rig = model_of(scenario)
+    for effect in scenario.hidden():
+        rig = effect.apply(rig)
+    instruments = {name: value for name, value in scenario.instruments if value is not None}
+    return instrument(rig, **instruments, sample_rate=scenario.test.sample_rate) if instruments else rig
+
+
+def model_of(scenario: Scenario) -> Rig:
+    """The model as its file says, with the channels of the scenario connected."""
     path = scenario.model_file()
     try:
         rig = Rig.load(path)
@@ -103,9 +112,15 @@ def rig_of(scenario: Scenario) -> Rig:
     wanted = scenario.channels
     # An axis across all motion would only record rounding errors.
     outputs = rig.responding if wanted.outputs is None else wanted.outputs
-    rig = rig.connected(inputs=wanted.inputs, outputs=outputs)
-    instruments = {name: value for name, value in scenario.instruments if value is not None}
-    return instrument(rig, **instruments, sample_rate=scenario.test.sample_rate) if instruments else rig
+    return rig.connected(inputs=wanted.inputs, outputs=outputs)
+
+
+def truth_of(scenario: Scenario, rig: Rig) -> Rig:
+    """The rig whose modes and matrices count as true: the one that was simulated, unless an effect bent a linear model."""
+    if not scenario.effects:
+        return rig
+    model = model_of(scenario)
+    return model if model.linear and not rig.linear else rig
 
 
 def touched(rig: Rig) -> list[str]:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import dataclasses
 import json
 import tomllib
+from collections.abc import Mapping
 from pathlib import Path
 from typing import Annotated, Any
 
@@ -20,6 +21,8 @@ from pydantic import (
 )
 
 from lab import catalogue
+from lab.effects import EFFECTS
+from lab.effects.effect import Effect
 from lab.errors import FileError, StudyError
 from lab.excitation import EXCITATIONS, Excitation
 
@@ -117,6 +120,8 @@ class Scenario(Table):
         seed: of everything random.
         test: how the test is run.
         excitation: its kind, as in `EXCITATIONS`, and its settings.
+        effects: what is wrong with the real structure or its instruments: a list of tables with cause, location and
+            parameters, as in `lab list effects`; the model knows nothing of it.
         channels: which actuators and sensors are connected.
         instruments: what measures.
         identification: how the recording is identified.
@@ -128,6 +133,7 @@ class Scenario(Table):
     seed: Annotated[int, Field(ge=0)] = 0
     test: Schedule
     excitation: dict[str, Any]
+    effects: list[dict[str, Any]] = []
     channels: Channels = Channels()
     instruments: Instruments = Instruments()
     identification: Identification = Identification()
@@ -167,22 +173,16 @@ class Scenario(Table):
         Raises:
             StudyError: unknown kind or setting, or an impossible value.
         """
-        settings = dict(self.excitation)
-        kind = settings.pop("kind", None)
-        if kind is None:
-            raise StudyError("key 'kind' is missing in [excitation]")
-        if kind not in EXCITATIONS:
-            raise StudyError(f"kind = {kind!r} in [excitation]; expected one of {', '.join(EXCITATIONS)}")
-        known = [field.name for field in dataclasses.fields(EXCITATIONS[kind])]
-        unknown = [key for key in settings if key not in known]
-        if unknown:
-            raise StudyError(_unknown_key(unknown[0], "excitation", ["kind", *known]))
-        # As JSON, a list may stand for a tuple while text still does not stand for a number.
-        text = json.dumps(settings, default=str)
-        try:
-            return TypeAdapter(EXCITATIONS[kind]).validate_json(text, strict=True)
-        except ValidationError as error:
-            raise StudyError(_explain(error, "excitation")) from None
+        excitation: Excitation = _chosen(self.excitation, "excitation", "kind", EXCITATIONS)
+        return excitation
+
+    def hidden(self) -> tuple[Effect, ...]:
+        """The effects, in the order in which they come about.
+
+        Raises:
+            StudyError: unknown cause or parameter, or an impossible value.
+        """
+        return tuple(_chosen(table, "effects", "cause", EFFECTS) for table in self.effects)
 
 
 def load_scenario(path: str | Path) -> Scenario:
@@ -208,6 +208,7 @@ def load_scenario(path: str | Path) -> Scenario:
         scenario = Scenario.model_validate(tomllib.loads(text))
         scenario._folder, scenario._text = path.parent, text
         scenario.drive()
+        scenario.hidden()
     except tomllib.TOMLDecodeError as error:
         raise StudyError(f"{path}: is not TOML ({error})") from None
     except ValidationError as error:
@@ -215,6 +216,26 @@ def load_scenario(path: str | Path) -> Scenario:
     except StudyError as error:
         raise StudyError(f"{path}: {error}") from None
     return scenario
+
+
+def _chosen(table: Mapping[str, Any], name: str, key: str, known: Mapping[str, type]) -> Any:
+    """The object that a table describes: its class under `key`, and the fields of that class."""
+    settings = dict(table)
+    kind = settings.pop(key, None)
+    if kind is None:
+        raise StudyError(f"key {key!r} is missing {_place(name)}")
+    if kind not in known:
+        raise StudyError(f"{key} = {kind!r} {_place(name)}; expected one of {', '.join(known)}")
+    allowed = [field.name for field in dataclasses.fields(known[kind])]
+    unknown = [setting for setting in settings if setting not in allowed]
+    if unknown:
+        raise StudyError(_unknown_key(unknown[0], name, [key, *allowed]))
+    # As JSON, a list may stand for a tuple while text still does not stand for a number.
+    text = json.dumps(settings, default=str)
+    try:
+        return TypeAdapter(known[kind]).validate_json(text, strict=True)
+    except ValidationError as error:
+        raise StudyError(_explain(error, name)) from None
 
 
 def _explain(error: ValidationError, *inside: str) -> str:
