@@ -6,7 +6,6 @@ from pathlib import Path
 import numpy as np
 
 from lab import catalogue
-from lab.rig import Rig
 
 ROOT = Path(__file__).parent.parent
 README = (ROOT / "README.md").read_text("utf-8")
@@ -42,19 +41,3 @@ def test_links_lead_somewhere():
     prose = re.sub(r"```.*?```", "", README, flags=re.DOTALL)
     for target in re.findall(r"\]\(([^)#]+)\)", prose):
         assert target.startswith("https://") or (ROOT / target).exists(), target
-
-
-def test_the_table_of_models_is_true():
-    rows = re.findall(r"^\| `(\w+)` \|(.*)\|$", (ROOT / "models/README.md").read_text("utf-8"), re.MULTILINE)
-    assert {name for name, _ in rows} == set(catalogue.files("models"))
-    for name, cells in rows:
-        *_, n_dofs, frequencies, ratios = (cell.strip() for cell in cells.split(" | "))
-        modes = Rig.load(catalogue.find("models", name)).second_order().modes()
-        assert int(n_dofs) == len(modes)
-        # As many digits as are printed.
-        np.testing.assert_allclose(
-            modes.frequency_hz, [float(f) for f in frequencies.split(", ")], atol=5.1e-5
-        )
-        np.testing.assert_allclose(
-            100 * modes.damping_ratio, [float(z) for z in ratios.split(", ")], atol=5.1e-3
-        )

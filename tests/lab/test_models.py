@@ -186,7 +186,7 @@ def test_the_table_lists_every_model():
     assert sorted(table()) == EVERY
 
 
-@pytest.mark.parametrize("name", [*LINEAR, "truss_spatial"])
+@pytest.mark.parametrize("name", EVERY)
 def test_the_text_names_channels_that_exist(name):
     text = (MODELS / "README.md").read_text("utf-8")
     section = next(part for part in text.split("\n## ")[1:] if name in part.splitlines()[0].split(", "))
