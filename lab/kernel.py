@@ -97,7 +97,22 @@ def _stick(S, T, R, x, u, laws, params, stuck, g):  # type: ignore[no-untyped-de
 
 
 @njit(cache=True, nogil=True)
-def respond(F, G, P, Q, X, V, S, T, R, C, D, E, laws, params, u, x0, n_record, L, y):  # type: ignore[no-untyped-def]
+def _read(step, at, C, D, E, x, u, g, out):  # type: ignore[no-untyped-def]
+    """Puts into out what is read at the start of that substep."""
+    for i in range(out.size):
+        if at[i] == step:
+            value = 0.0
+            for j in range(x.size):
+                value += C[i, j] * x[j]
+            for j in range(u.size):
+                value += D[i, j] * u[j]
+            for e in range(g.size):
+                value += E[i, e] * g[e]
+            out[i] = value
+
+
+@njit(cache=True, nogil=True)
+def respond(F, G, P, Q, X, V, S, T, R, at, C, D, E, laws, params, u, x0, n_record, L, y):  # type: ignore[no-untyped-def]
     """Outputs, shape (n_samples, n_outputs), of one record; NaN from where the motion diverges.
 
     Args:
@@ -107,7 +122,8 @@ def respond(F, G, P, Q, X, V, S, T, R, C, D, E, laws, params, u, x0, n_record, L
             for dry friction, which jumps, zero and the force that is one all along.
         X, V: rows of extension and of its rate, (n_laws, n_states).
         S, T, R: rate of the rate from state, input and law forces.
-        C, D, E: outputs from state, input and law forces.
+        at: substep at whose start each output is read, (n_outputs,).
+        C, D, E: outputs from state, input and law forces there.
         laws, params: law numbers (n_laws,) and parameters (n_laws, 3).
         u: inputs, (n_samples, n_inputs).
         x0: state at the start.
@@ -148,23 +164,18 @@ def respond(F, G, P, Q, X, V, S, T, R, C, D, E, laws, params, u, x0, n_record, L
                 _stick(S, T, R, x, u[k], laws, params, stuck, g)
             if pull == 1:
                 break
-            for i in range(n_outputs):
-                value = 0.0
-                for j in range(n_states):
-                    value += C[i, j] * x[j]
-                for j in range(n_inputs):
-                    value += D[i, j] * u[k, j]
-                for e in range(n_laws):
-                    value += E[i, e] * g[e]
-                out[k, i] = value
+            _read(0, at, C, D, E, x, u[k], g, out[k])
             if observed:
                 for i in range(n_outputs):
-                    error = y[k, i] - out[k, i]
+                    # What is read later cannot correct the state yet.
+                    error = y[k, i] - out[k, i] if at[i] == 0 else np.nan
                     if error == error:
                         for j in range(n_states):
                             x[j] += L[j, i] * error
         for step in range(substeps):
             s = (k + (step + 1) / substeps) / n_record
+            if step > 0:
+                _read(step, at, C, D, E, x, u[k], g, out[k])
             for j in range(n_states):
                 value = 0.0
                 for i in range(n_inputs):
@@ -229,5 +240,8 @@ def respond(F, G, P, Q, X, V, S, T, R, C, D, E, laws, params, u, x0, n_record, L
                 finite = finite and abs(value) < 1e100
             if not finite:
                 out[k + 1 :] = np.nan
+                for i in range(n_outputs):
+                    if at[i] > step:
+                        out[k, i] = np.nan
                 return out
     return out

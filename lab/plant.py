@@ -114,7 +114,7 @@ class Responder:
     plant: Plant
     dt: float
     substeps: int
-    matrices: tuple[Array, ...]  # F, G, P, Q, X, V, S, T, R, C, D, E
+    matrices: tuple[Array, ...]  # F, G, P, Q, X, V, S, T, R, at, C, D, E
     laws: np.ndarray
     parameters: Array
 
@@ -222,28 +222,43 @@ def ready(plant: Plant, dt: float, *, substeps: int = 6) -> Responder:
     X, V = np.zeros((len(rows), b)), np.zeros((len(rows), b))
     X[:, :n], V[:, n : 2 * n] = rows, rows
     S, T, R = V @ A, V @ _acting(B, 0.0, changes), V @ W
-    C, D, E = _late_readings(plant, dt, A, B, W, C, D, E, changes)
+    at, C, D, E = _late_readings(plant, dt, sub, A, B, W, C, D, E, changes)
     parameters = np.zeros((len(rows), 3))
     for i, law in enumerate(plant.laws):
         parameters[i, : len(law.parameters)] = law.parameters
-    matrices = tuple(np.ascontiguousarray(m) for m in (F, G, P, Q, X, V, S, T, R, C, D, E))
+    matrices = tuple(np.ascontiguousarray(m) for m in (F, G, P, Q, X, V, S, T, R, at, C, D, E))
     kinds = np.array([law.kind for law in plant.laws], dtype=np.int64)
     return Responder(plant, dt, sub, matrices, kinds, parameters)
 
 
 def _late_readings(
-    plant: Plant, dt: float, A: Array, B: Array, W: Array, C: Array, D: Array, E: Array, changes: Changes
-) -> tuple[Array, Array, Array]:
-    """Readings of delayed outputs part of a sample after each instant, so that whole samples make up their delay."""
-    both, C, D, E = D, C.copy(), _acting(D, 0.0, changes), E.copy()
+    plant: Plant,
+    dt: float,
+    sub: int,
+    A: Array,
+    B: Array,
+    W: Array,
+    C: Array,
+    D: Array,
+    E: Array,
+    changes: Changes,
+) -> tuple[np.ndarray, Array, Array, Array]:
+    """Readings of delayed outputs part of a sample after each instant, so that whole samples make up their delay.
+
+    Each is taken from the start of the last substep before it.
+    """
+    both, at, C, D, E = D, np.zeros(len(C), dtype=np.int64), C.copy(), _acting(D, 0.0, changes), E.copy()
     for i, path in enumerate(plant.output_paths):
         ahead = (1 - path.parts(dt)[1]) * dt
         if ahead < dt:
-            F, _, P, Q = _over_a_substep(A, B, W, ahead)
-            G = _inputs_over(A, B, 0.0, ahead, changes)
+            at[i] = min(int(ahead / dt * sub + 1e-9), sub - 1)
+            start = at[i] * dt / sub
+            left = max(ahead - start, 0.0)
+            F, _, P, Q = _over_a_substep(A, B, W, left)
+            G = _inputs_over(A, B, start, left, changes)
             D[i] = C[i] @ G + _acting(both[[i]], ahead, changes)[0]
             C[i], E[i] = C[i] @ F, C[i] @ (P + Q) + E[i]
-    return C, D, E
+    return at, C, D, E
 
 
 def _acting(columns: Array, t: float, changes: Changes) -> Array:

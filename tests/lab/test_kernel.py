@@ -1,0 +1,130 @@
+"""The kernel: the same compiled and plain, of second order, and honest where the motion diverges."""
+
+import numpy as np
+import pytest
+import scipy.linalg
+
+from lab import forces, kernel
+from lab.plant import ready
+from lab.twin import twin
+from tests.lab.effects.cases import CASES
+from tests.lab.effects.reference import DT, EYE, SPRING, local, nominal, system
+from tests.lab.effects.reference import forces as pushed
+
+LAWS = {
+    "cubic": (forces.CUBIC, (4000.0, 10.0)),
+    "quadratic": (forces.QUADRATIC, (1.5, 0.2)),
+    "bilinear": (forces.BILINEAR, (24.0,)),
+    "deadband": (forces.DEADBAND, (0.01, 60.0)),
+    "stop": (forces.STOP, (0.02, 200.0, 1.0)),
+    "dry friction": (forces.COULOMB, (0.5, 0.0)),
+    "rounded friction": (forces.COULOMB, (0.5, 0.02)),
+    "Bouc-Wen": (forces.BOUC_WEN, (30.0, 0.04)),
+    "drift": (forces.DRIFT, (-30.0,)),
+}
+
+
+def pushes(n=120, seed=0):
+    return np.random.default_rng(seed).standard_normal((2, n))
+
+
+def with_laws(*names, row=SPRING):
+    plant = twin(nominal()).plant
+    for name in names:
+        kind, parameters = LAWS[name]
+        plant = plant.with_law(kind, row, *parameters)
+    return plant
+
+
+def error(found, truth):
+    return np.max(np.max(np.abs(found - truth), axis=1) / np.max(np.abs(truth), axis=1))
+
+
+@pytest.mark.parametrize("names", [*((name,) for name in LAWS), ("cubic", "dry friction", "Bouc-Wen")])
+def test_compiled_is_plain(names, monkeypatch):
+    responder, u = ready(with_laws(*names), DT, substeps=4), pushes(25)
+    compiled = responder.outputs(u, 25)
+    for function in ("force", "_dry", "_rounded", "_stick", "_read", "respond"):
+        monkeypatch.setattr(kernel, function, getattr(kernel, function).py_func)
+    # The compiler may join a product and a sum, which rounds once instead of twice.
+    assert error(responder.outputs(u, 25), compiled) < 1e-11
+
+
+def test_every_law_is_tried():
+    assert {kind for kind, _ in LAWS.values()} == set(range(8))
+
+
+@pytest.mark.parametrize("name", [name for name, case in CASES.items() if case.order and case.twin > 1e-9])
+def test_second_order_in_the_substep(name):
+    plant, u = twin(CASES[name].effect.apply(nominal())).plant, pushes(80)
+    truth = CASES[name].reference(u)
+    coarse, fine = (error(ready(plant, DT, substeps=n).outputs(u, 80), truth) for n in (4, 32))
+    # Kinks fall anywhere within a substep, so that the observed order scatters about 2.
+    assert np.log(coarse / fine) / np.log(8) > 1.5
+
+
+def test_rounded_friction():
+    u = pushes(60)
+    truth = local(u, lambda s, x, v, z: (0.5 * np.tanh(v / 0.02), 0.0), row=EYE[1])
+    found = ready(with_laws("rounded friction", row=EYE[1]), DT, substeps=96).outputs(u, 60)
+    # Second order with a slope of 25 N s/m inside the layer: (25 / 2 kg · dt / 96)² = 4e-5, times a few turns.
+    assert error(found, truth) < 1e-3
+
+
+def test_laws_add_up():
+    u = pushes(80)
+
+    def both(s, x, v, z):
+        return 4000 * x**3 + 10 * x**2 + 1.5 * abs(v) * v + 0.2 * v**3, 0.0
+
+    found = ready(with_laws("cubic", "quadratic"), DT, substeps=48).outputs(u, 80)
+    assert error(found, local(u, both)) < 1e-4
+
+
+def test_a_stuck_mass_stands_still():
+    # Friction beyond every force holds: the outputs of that mass are zero, its acceleration too.
+    plant = twin(nominal()).plant.with_law(forces.COULOMB, EYE[1], 1e3, 0.0)
+    u = pushes()
+    y = ready(plant, DT).outputs(u, u.shape[1])
+    assert np.max(np.abs(y[[1, 3]])) < 1e-12 * np.max(np.abs(y))
+    assert np.max(np.abs(y[0])) > 0.1
+
+
+def test_divergence_is_marked_from_where_it_happens():
+    plant = twin(nominal()).plant.with_law(forces.CUBIC, SPRING, -1e9, 0.0)
+    y = ready(plant, DT).outputs(pushes(), 120)
+    lost = np.isnan(y).any(axis=0)
+    assert lost[-1]
+    assert not lost[0]
+    assert np.all(lost[np.argmax(lost) :])
+
+
+def test_an_observer_believes_a_perfect_model():
+    responder, u = ready(with_laws("cubic"), DT), pushes()
+    y = responder.outputs(u, 120)
+    gain = np.random.default_rng(1).standard_normal((6, 5)) * 1e-2
+    again = responder.outputs(u, 120, observer=gain, measured=y)
+    assert error(again, y) < 1e-11
+
+
+def test_an_observer_is_the_plain_recursion():
+    u, y = pushes(40), pushes(100).reshape(5, 40)
+    start, gain = np.full(6, 0.1), 1e-2 * np.random.default_rng(1).standard_normal((6, 5))
+    A, B, C, D = system()
+    step = scipy.linalg.expm(np.block([[A, B], [np.zeros((3, 9))]]) * DT)[:6]
+    x, expected = start.copy(), np.empty((5, 40))
+    for k, f in enumerate(pushed(u).T):
+        expected[:, k] = C @ x + D @ f
+        x = step @ np.concatenate([x + gain @ (y[:, k] - expected[:, k]), f])
+    found = ready(twin(nominal()).plant, DT).outputs(u, 40, initial=start, observer=gain, measured=y)
+    assert error(found, expected) < 1e-12
+
+
+def test_missing_measurements_pull_nothing():
+    responder, u = ready(twin(nominal()).plant, DT), pushes(40)
+    start = np.full(6, 0.1)
+    free = responder.outputs(u, 40, initial=start)
+    nothing = responder.outputs(
+        u, 40, initial=start, observer=np.ones((6, 5)), measured=np.full((5, 40), np.nan)
+    )
+    np.testing.assert_array_equal(nothing, free)
