@@ -7,7 +7,7 @@ from typing import ClassVar
 
 from lab import forces
 from lab.effects.edits import law_of
-from lab.effects.effect import AtSpring, Effect
+from lab.effects.effect import AtStiffness, Effect
 from lab.effects.one_sided import one_sided
 from lab.effects.survey import Guess, Survey
 from lab.plant import Plant
@@ -15,7 +15,7 @@ from lab.rig import Rig
 
 
 @dataclass(frozen=True)
-class BilinearStiffness(AtSpring, Effect):
+class BilinearStiffness(AtStiffness, Effect):
     """A spring has stiffness k (1 + r) where its extension is positive, k where it is negative.
 
     Attributes:

@@ -13,6 +13,7 @@ from typing import Any, ClassVar
 
 from identification.recording import Channel
 from lab.chain import ALL, Stage
+from lab.effects.edits import law_of
 from lab.effects.survey import Guess, Survey
 from lab.errors import LabError, UnknownNameError
 from lab.paths import ORDER
@@ -122,6 +123,24 @@ class AtSpring:
     def places(cls, rig: Rig) -> tuple[str, ...]:
         """Every spring."""
         return tuple(spring.name for spring in rig.springs)
+
+
+class AtStiffness(AtSpring):
+    """Sits in a spring that has stiffness, not in a mere damper."""
+
+    @classmethod
+    def places(cls, rig: Rig) -> tuple[str, ...]:
+        """Every spring with stiffness."""
+        return tuple(spring.name for spring in rig.springs if any(law_of(rig, spring)[0]))
+
+
+class AtDamping(AtSpring):
+    """Sits in a spring that has damping."""
+
+    @classmethod
+    def places(cls, rig: Rig) -> tuple[str, ...]:
+        """Every spring with damping."""
+        return tuple(spring.name for spring in rig.springs if any(law_of(rig, spring)[1]))
 
 
 class AtBody:

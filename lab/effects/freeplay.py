@@ -7,14 +7,14 @@ from typing import ClassVar
 
 from lab import forces
 from lab.effects.edits import copy_of, law_of, numbers, with_law, with_tendon
-from lab.effects.effect import AtSpring, Effect
+from lab.effects.effect import AtStiffness, Effect
 from lab.effects.survey import Guess, Survey
 from lab.plant import Plant
 from lab.rig import Rig
 
 
 @dataclass(frozen=True)
-class Freeplay(AtSpring, Effect):
+class Freeplay(AtStiffness, Effect):
     """A spring has no stiffness force while |x| is less than the gap, and k (|x| - gap) beyond; its damping stays.
 
     Attributes:

@@ -6,7 +6,7 @@ from dataclasses import dataclass, replace
 from typing import ClassVar
 
 from lab.effects.edits import law_of, with_law
-from lab.effects.effect import EVERYWHERE, AtSpring, Effect
+from lab.effects.effect import EVERYWHERE, AtStiffness, Effect
 from lab.effects.survey import Survey
 from lab.errors import LabError
 from lab.plant import Plant
@@ -14,7 +14,7 @@ from lab.rig import Rig
 
 
 @dataclass(frozen=True)
-class StiffnessChange(AtSpring, Effect):
+class StiffnessChange(AtStiffness, Effect):
     """A spring has another stiffness than the model says.
 
     Attributes:

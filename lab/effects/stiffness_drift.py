@@ -7,14 +7,14 @@ from typing import ClassVar
 
 from lab import forces, laws
 from lab.effects.edits import law_of
-from lab.effects.effect import AtSpring, Effect
+from lab.effects.effect import AtStiffness, Effect
 from lab.effects.survey import Guess, Survey
 from lab.plant import Plant
 from lab.rig import Rig
 
 
 @dataclass(frozen=True)
-class StiffnessDrift(AtSpring, Effect):
+class StiffnessDrift(AtStiffness, Effect):
     """A spring's stiffness changes linearly from k at the start of a record to k (1 + r) at its end.
 
     Attributes:

@@ -260,11 +260,12 @@ def test_parameters_of_the_model_are_not_searched_for():
     assert calibrated == {"mass_change", "stiffness_change", "damping_change"}
 
 
-# Bodies, springs, joints and channels of the founding models; pairs of bodies that no spring ties.
+# Of the founding models: bodies, springs, springs with stiffness (the joints of the truss are mere dampers), joints and
+# springs that may rub, and pairs of bodies that no spring ties.
 PLACES = {
-    "chain3_uncoupled": {"body": 3, "spring": 6, "friction": 6, "missing": 0},
-    "chain7": {"body": 7, "spring": 7, "friction": 14, "missing": 21},
-    "truss": {"body": 4, "spring": 22, "friction": 22, "missing": 0},
+    "chain3_uncoupled": {"body": 3, "spring": 6, "stiff": 6, "friction": 6, "missing": 0},
+    "chain7": {"body": 7, "spring": 7, "stiff": 7, "friction": 14, "missing": 21},
+    "truss": {"body": 4, "spring": 22, "stiff": 14, "friction": 22, "missing": 0},
 }
 
 
@@ -287,6 +288,8 @@ def test_places_of_the_founding_models(model):
             expected = n_out
         elif cause.startswith("actuator"):
             expected = n_in
+        elif cause in ("stiffness_change", "bilinear_stiffness", "freeplay", "stiffness_drift"):
+            expected = count["stiff"]
         else:
             expected = count["spring"]
         assert len(effect.places(rig)) == expected, cause
