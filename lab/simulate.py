@@ -225,12 +225,14 @@ class _Bench:
             outputs = [part.outputs for part in coarse.batch(pilots, None)]
             accuracy = self._default_accuracy(np.concatenate(outputs, axis=2))
         finest = FINEST if asked is not None else FINEST_UNASKED
-        best = plan = self._measured(stepping.first_guess(self.rig, dt, accuracy, duration), pilots, growth)
+        best = plan = self._measured(stepping.first_guess(self.rig, dt, accuracy / 2, duration), pilots, growth)
         in_vain = 0
+        # The rest of the record may err by somewhat more than its start: aim at half of what is asked for.
+        aim = accuracy / 2
         # Rounding puts a floor under the error: two finer plans that are hardly better have met it.
-        while best.error > accuracy and plan.substeps < finest and in_vain < 2:
+        while best.error > aim and plan.substeps < finest and in_vain < 2:
             before = plan.error
-            plan = self._measured(stepping.finer(self.rig, dt, plan, accuracy, finest), pilots, growth)
+            plan = self._measured(stepping.finer(self.rig, dt, plan, aim, finest), pilots, growth)
             in_vain = 0 if plan.error < before / 2 else in_vain + 1
             if in_vain and plan.cancelled and self.rig.chain.needs_substeps:
                 # An instrument clips: there is no power series to cancel.

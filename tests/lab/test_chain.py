@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 import scipy.linalg
 import scipy.signal
-from hypothesis import given
+from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from lab.chain import (
@@ -298,6 +298,7 @@ def test_held_hum():
 # Blocks.
 
 
+@settings(max_examples=20)
 @given(st.lists(st.integers(0, 200), max_size=6))
 @pytest.mark.parametrize("name", STAGES)
 def test_a_signal_cut_into_blocks_gives_the_same_bits(name, cuts):

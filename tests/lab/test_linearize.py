@@ -168,6 +168,13 @@ def test_small_feedthrough_of_a_stiff_heavy_structure_is_kept():
         np.testing.assert_allclose(system.C[0, 0], -k / mass, rtol=1e-9)
 
 
+def test_weak_inputs_are_kept_beside_strong_ones():
+    weak = '<motor name="force" joint="x"/><motor name="weak" joint="x" gear="1e-11"/>'
+    rig = Rig.from_xml(oscillator().replace('<motor name="force" joint="x"/>', weak))
+    np.testing.assert_allclose(rig.state_space().B[1], [0.5, 0.5e-11], rtol=1e-14)
+    assert rig.inputs[1].factor == 1e-11
+
+
 def test_actuator_dynamics_are_states():
     """A first-order lag of 0.2 s before the force: one more state a with ȧ = (u - a) / 0.2."""
     for kind in ("filter", "filterexact"):

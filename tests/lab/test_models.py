@@ -109,7 +109,7 @@ def geometric_differences():
     for rms, accuracy in ((1e-3, 1e-8), (1e-1, 1e-9), (10.0, 1e-9)):
         both = [
             lab.simulate(
-                moving(name), Random(rms=rms), sample_rate=50.0, duration=3.0, seed=2, accuracy=accuracy
+                moving(name), Random(rms=rms), sample_rate=50.0, duration=2.0, seed=2, accuracy=accuracy
             )
             for name in ("truss", "truss_spatial")
         ]

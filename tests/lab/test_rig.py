@@ -43,7 +43,7 @@ def networks(draw):
 
 
 @given(networks())
-@settings(max_examples=40)
+@settings(max_examples=25)
 def test_truth_of_any_spring_mass_network(network):
     rig = Rig.from_xml(chain_xml(*network))
     M, C_d, K = chain_matrices(*network)

@@ -72,7 +72,7 @@ def test_default_accuracy(name, drive):
     rig = moving(name)
     # Two inputs, for speed; all of them below.
     rig = rig.connected(inputs=[rig.inputs[0].name, rig.inputs[-1].name])
-    check_accuracy(run(rig, drive, sample_rate=rate, duration=200 / rate, seed=3), structure, 1e-9)
+    check_accuracy(run(rig, drive, sample_rate=rate, duration=120 / rate, seed=3), structure, 1e-9)
 
 
 @pytest.mark.slow
@@ -117,7 +117,7 @@ def test_twelve_digits_of_larger_models(name, drive):
     check_accuracy(run(rig, drive, sample_rate=rate, accuracy=1e-12), structure, 1e-12)
 
 
-@pytest.mark.parametrize(("damping_ratio", "duration"), [(1e-3, 300.0), (1e-4, 300.0), (0.0, 400.0)])
+@pytest.mark.parametrize(("damping_ratio", "duration"), [(1e-3, 250.0), (0.0, 250.0)])
 def test_errors_that_build_up_slowly_are_seen(damping_ratio, duration, monkeypatch):
     """A lightly damped mode gathers the error of many samples, long after the trial run."""
     # The trial run ends before the error does.
@@ -146,8 +146,6 @@ def test_accuracy_follows_the_noise():
     # Percent and rounding errors of one channel add up; the least disturbed channel counts.
     shares = [0.05 * np.sqrt(np.mean(y**2)) / np.max(np.abs(y)) for y in clean]
     assert finest.attributes["simulation_accuracy"] == pytest.approx(1e-3 * min(shares), rel=1e-3)
-    # 24 dB per octave of order: fewer substeps for noisier channels.
-    assert noisy.attributes["simulation_substeps"] < run(one(), WHITE).attributes["simulation_substeps"]
 
 
 def test_an_accuracy_out_of_reach_is_refused():
@@ -168,7 +166,7 @@ def test_unit_pulses_give_markov_parameters(name):
     """Record j is column j of D, CB, CAB, …: the sampled model's own, from one matrix exponential."""
     rate, rig = LINEAR[name][0], moving(name)
     rig = rig.connected(inputs=[rig.inputs[1].name, rig.inputs[0].name])
-    recording = run(rig, Pulse(), sample_rate=rate, duration=60 / rate)
+    recording = run(rig, Pulse(), sample_rate=rate, duration=40 / rate)
     continuous = rig.state_space()
     n, m = continuous.B.shape
     block = np.zeros((n + m, n + m))
@@ -178,7 +176,7 @@ def test_unit_pulses_give_markov_parameters(name):
     for j, record in enumerate(recording.records):
         expected = [continuous.D[:, j]]
         x = B[:, j]
-        for _ in range(59):
+        for _ in range(39):
             expected.append(continuous.C @ x)
             x = A @ x
         expected = np.array(expected).T
@@ -323,6 +321,24 @@ def test_shaker_with_a_lag():
     )
 
 
+def test_instruments_with_a_memory_do_not_cost_their_accuracy():
+    """Straight lines between substeps err by h², which extrapolation cancels: ten digits from a few substeps."""
+    tau = 0.08
+    rig = one(Chain(actuators=(Lag("force", 1 / (2 * np.pi * tau)),)))
+    recording = run(rig, WHITE, accuracy=1e-10)
+    assert relative(recording.records[0].outputs[[0, 2]], lagged_response(recording, tau)) <= 1e-10
+    assert recording.attributes["simulation_substeps"] <= 40
+
+
+def test_instruments_that_clip_are_still_followed():
+    """A clipped force after a lag has kinks that cancel nothing; more substeps do."""
+    rig = one(Chain(actuators=(Lag("force", 3.0), Saturation("force", 2.0))))
+    recording = run(rig, WHITE, accuracy=1e-4)
+    fine = run(rig, WHITE, accuracy=1e-5)
+    assert relative(recording.records[0].outputs, fine.records[0].outputs) <= 1.1e-4
+    assert recording.attributes["simulation_error"] <= 1e-4
+
+
 def test_recorded_force_is_the_command_or_what_a_load_cell_saw():
     tau = 0.08
     actuators = (Lag("force", 1 / (2 * np.pi * tau)), Gain("force", -0.25))
@@ -389,6 +405,22 @@ def test_sensors_with_a_lag(row, drive):
         held_response(ONE, recording.outputs, recording.dt, np.asarray(recording.records[0].inputs)), row, 0
     )
     assert relative(others, ideal) <= 1e-6
+
+
+def test_lagging_sensors_before_a_release():
+    """Held still where it starts: a position has been there all the time, velocity and acceleration begin with the release."""
+    tau, dt, x0, v0 = 0.08, 0.05, 0.3, -0.7
+    sensors = tuple(Lag(channel, 1 / (2 * np.pi * tau)) for channel in ("pos", "vel", "acc.x"))
+    recording = run(one(Chain(sensors=sensors)), FreeDecay({"x": x0}, {"x": v0}), accuracy=1e-7)
+    F = np.zeros((5, 5))  # x, v and the filters of x, v, a
+    F[0, 1], F[1, :2] = 1, [-25, -0.2]
+    F[2, [0, 2]], F[3, [1, 3]] = [1 / tau, -1 / tau], [1 / tau, -1 / tau]
+    F[4, [0, 1, 4]] = [-25 / tau, -0.2 / tau, -1 / tau]
+    state, step, exact = np.array([x0, v0, x0, 0, 0]), scipy.linalg.expm(F * dt), []
+    for _ in range(200):
+        exact.append(state[2:])
+        state = step @ state
+    assert relative(recording.records[0].outputs, np.array(exact).T) <= 1e-7
 
 
 def test_anti_alias_filter():
@@ -462,7 +494,7 @@ def test_noise_of_force_sensors_is_on_the_recorded_input_only():
 
 def test_dropouts_and_resolution():
     rig = one(Chain(acquisition=(Resolution("pos", 0.01), Dropout("vel", 0.1))))
-    clean, real = (run(r, WHITE, duration=100.0, accuracy=1e-6).records[0] for r in (one(), rig))
+    clean, real = (run(r, WHITE, duration=100.0, accuracy=1e-4).records[0] for r in (one(), rig))
     np.testing.assert_allclose(real.outputs[0] / 0.01, np.round(clean.outputs[0] / 0.01), atol=1e-9)
     lost = np.isnan(real.outputs[1])
     assert 0.05 < np.mean(lost) < 0.15
@@ -476,6 +508,14 @@ def test_swapped_cables():
     rig = one(Chain(swaps=(("pos", "vel"),), acquisition=acquisition))
     ideal, real = (run(r, WHITE, accuracy=1e-9).records[0].outputs for r in (one(), rig))
     np.testing.assert_array_equal(real, [2 * ideal[1], ideal[0], ideal[2]])
+
+
+def test_noise_in_percent_follows_the_signal_that_the_cable_carries():
+    rig = one(Chain(swaps=(("pos", "vel"),)))
+    noisy = rig.with_chain(rig.chain.adding("acquisition", Noise("pos", percent=5.0)))
+    clean, real = (run(r, WHITE, duration=400.0, accuracy=1e-4).records[0].outputs[0] for r in (rig, noisy))
+    # 8000 samples: 0.8 % of scatter. Position and velocity differ by a factor of about five.
+    assert np.std(real - clean) == pytest.approx(0.05 * np.sqrt(np.mean(clean**2)), rel=0.032)
 
 
 def test_disturbances_push_without_being_recorded():
@@ -524,7 +564,7 @@ def test_memory_and_file_hold_the_same_bits(chain, drive, tmp_path):
 @pytest.mark.parametrize("chain", CHAINS)
 @pytest.mark.parametrize("threads", [1, 3])
 def test_threads_and_memory_do_not_matter(chain, threads, monkeypatch, tmp_path):
-    settings = {"sample_rate": 20.0, "duration": 2.0, "n_runs": 3, "accuracy": 1e-4}
+    settings = {"sample_rate": 20.0, "duration": 2.0, "n_runs": 3, "accuracy": 1e-3}
     rig = one(CHAINS[chain])
     expected = lab.simulate(rig, WHITE, **settings)
     monkeypatch.setattr(os, "cpu_count", lambda: threads)
@@ -547,11 +587,11 @@ def test_blocks_of_a_load_do_not_matter(chain, block, monkeypatch):
 
 def test_long_records_run_through_many_blocks(tmp_path):
     """More samples than a block holds, in memory and into a file, against the exact response."""
-    settings = {"sample_rate": 20.0, "duration": 250.0, "accuracy": 1e-6}
+    settings = {"sample_rate": 20.0, "duration": 210.0, "accuracy": 1e-5}
     rig = one(CHAINS["ideal"])
     recording = lab.simulate(rig, WHITE, **settings)
     assert recording.n_samples > excitation.BLOCK
-    assert true_error(recording, ONE) <= 1e-6
+    assert true_error(recording, ONE) <= 1e-5
     simulate_to_file(tmp_path / "r.h5", rig, WHITE, **settings)
     assert same(load(tmp_path / "r.h5"), recording)
 
