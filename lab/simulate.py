@@ -25,7 +25,7 @@ PILOT_SAMPLES, MOST_PILOT_SAMPLES = 256, 4096
 FINEST, FINEST_UNASKED = 4096, 256
 """Most substeps per sample, for an accuracy that was asked for and for the default one."""
 
-IDEAL_ACCURACY = 1e-9
+IDEAL_ACCURACY, PICTURE_ACCURACY = 1e-9, 1e-3
 NOISE_SHARE = 1e-3
 """Default error: this share of the smallest noise in the chain, or `IDEAL_ACCURACY` when the chain adds none."""
 
@@ -140,8 +140,9 @@ def motion(
     seed: int = 0,
     progress: Progress | None = None,
 ) -> Motion:
-    """Motion of the first record of the same test, accurate enough to look at."""
-    bench = _Bench.prepare(rig, excitation, sample_rate, duration, 1, seed, 1e-4)
+    """Motion of the first record of the same test, accurate enough to look at; its error is not measured."""
+    bench = _Bench.loaded(rig, excitation, sample_rate, duration, 1, seed)
+    bench = bench._with(stepping.first_guess(rig, 1 / sample_rate, PICTURE_ACCURACY, duration))
     first = bench.loads[0]
     inputs, positions = [], []
     for part in bench.batch([first], progress):
@@ -186,14 +187,21 @@ class _Bench:
         seed: int,
         accuracy: float | None,
     ) -> _Bench:
+        if accuracy is not None and not 1e-13 <= accuracy < 1:
+            raise LabError(f"accuracy is {accuracy}; expected a relative error from 1e-13 to below 1")
+        return cls.loaded(rig, excitation, sample_rate, duration, n_runs, seed)._planned(accuracy)
+
+    @classmethod
+    def loaded(
+        cls, rig: Rig, excitation: Excitation, sample_rate: float, duration: float, n_runs: int, seed: int
+    ) -> _Bench:
+        """The bench with its loads on, the substeps still open."""
         for name, value in (("sample_rate", sample_rate), ("duration", duration)):
             if not (np.isfinite(value) and value > 0):
                 raise LabError(f"{name} is {value}; expected a positive number")
         for name, count, least in (("n_runs", n_runs, 1), ("seed", seed, 0)):
             if not (isinstance(count, int | np.integer) and count >= least):
                 raise LabError(f"{name} is {count}; expected a whole number of at least {least}")
-        if accuracy is not None and not 1e-13 <= accuracy < 1:
-            raise LabError(f"accuracy is {accuracy}; expected a relative error from 1e-13 to below 1")
         n_samples = round(duration * sample_rate)
         if n_samples < 1 or not rig.outputs:
             raise LabError(
@@ -203,8 +211,7 @@ class _Bench:
         sampling = Sampling(sample_rate, n_samples)
         every = [load for _ in range(n_runs) for load in excitation.loads(rig, sampling, rng)]
         loads = tuple(replace(load, number=number) for number, load in enumerate(every))
-        bench = cls(rig, loads, sample_rate, Plan(1), 0.0, seed)
-        return bench._planned(accuracy)
+        return cls(rig, loads, sample_rate, Plan(1), 0.0, seed)
 
     @property
     def attributes(self) -> dict[str, str | float]:
@@ -225,7 +232,9 @@ class _Bench:
             outputs = [part.outputs for part in coarse.batch(pilots, None)]
             accuracy = self._default_accuracy(np.concatenate(outputs, axis=2))
         finest = FINEST if asked is not None else FINEST_UNASKED
-        best = plan = self._measured(stepping.first_guess(self.rig, dt, accuracy / 2, duration), pilots, growth)
+        best = plan = self._measured(
+            stepping.first_guess(self.rig, dt, accuracy / 2, duration), pilots, growth
+        )
         in_vain = 0
         # The rest of the record may err by somewhat more than its start: aim at half of what is asked for.
         aim = accuracy / 2
