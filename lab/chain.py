@@ -27,6 +27,7 @@ import scipy.signal
 
 from identification.recording import Array
 from lab.errors import RigError, UnknownNameError
+from lab.filters import held_low_pass, low_pass
 
 Process = Callable[[Array], Array]
 """Turns the next block of a signal into what leaves the stage; remembers the blocks before."""
@@ -134,10 +135,10 @@ class Lag(Stage):
         return True
 
     def start(self, dt: float, rng: np.random.Generator, rms: float) -> Process:
-        return _low_pass(self.corner_hz, 1, dt)
+        return low_pass(self.corner_hz, 1, dt)
 
     def start_held(self, dt: float) -> Process:
-        return _held_low_pass(self.corner_hz, 1, dt)
+        return held_low_pass(self.corner_hz, 1, dt)
 
 
 @dataclass(frozen=True)
@@ -175,10 +176,10 @@ class LowPass(Stage):
         return True
 
     def start(self, dt: float, rng: np.random.Generator, rms: float) -> Process:
-        return _low_pass(self.corner_hz, self.order, dt)
+        return low_pass(self.corner_hz, self.order, dt)
 
     def start_held(self, dt: float) -> Process:
-        return _held_low_pass(self.corner_hz, self.order, dt)
+        return held_low_pass(self.corner_hz, self.order, dt)
 
 
 @dataclass(frozen=True)
@@ -461,82 +462,6 @@ def _stage(item: Mapping[str, Any]) -> Stage:
         raise RigError(
             f"stage {kind!r} was given {json.dumps(settings)}; expected {', '.join(f.name for f in fields(STAGES[kind]))}"
         ) from None
-
-
-class _Recursion:
-    """z(k+1) = exp(p h) z(k) + w(k) for one pole, over consecutive blocks; gives z(k), from z(0) = 0."""
-
-    def __init__(self, growth: complex) -> None:
-        self.growth, self.memory = growth, np.zeros(1, dtype=complex)
-
-    def __call__(self, w: Array) -> Array:
-        z, self.memory = scipy.signal.lfilter([0.0, 1.0], [1.0, -self.growth], w, zi=self.memory)
-        return np.asarray(z)
-
-
-def _low_pass(corner_hz: float, order: int, dt: float) -> Process:
-    """Analog Butterworth low-pass of a sensor's signal, exact for straight lines between substeps.
-
-    The signal is at the end of the substep before and at the start of the one after each instant, since it may jump.
-    """
-    poles, residues = _butterworth(corner_hz, order)
-    one, two = _phi(poles * dt)
-    recursions = [_Recursion(growth) for growth in np.exp(poles * dt)]
-    last, rest = 0.0, np.nan
-
-    def process(x: Array) -> Array:
-        nonlocal last, rest
-        if np.isnan(rest):
-            # The filter has settled on what it saw before the record.
-            rest = float(x[0, 0])
-        before, after = x[:2] - rest
-        # The line that ends at an instant starts just after the instant before it.
-        start, last = np.concatenate([[last], after[:-1]]), float(after[-1])
-        y = np.full(before.size, rest)
-        for i, recursion in enumerate(recursions):
-            w = dt * ((one[i] - two[i]) * start + two[i] * before)
-            # The line ends at this instant, so this instant's state holds it already.
-            z = recursion(w)
-            y += (residues[i] * (recursion.growth * z + w)).real
-        return np.stack([y, y, y])
-
-    return process
-
-
-def _held_low_pass(corner_hz: float, order: int, dt: float) -> Process:
-    """Analog Butterworth low-pass of a force that is held over each substep at its mean: exact for a held force."""
-    poles, residues = _butterworth(corner_hz, order)
-    one, two = _phi(poles * dt)
-    recursions = [_Recursion(growth) for growth in np.exp(poles * dt)]
-
-    def process(x: Array) -> Array:
-        y, u = np.zeros_like(x), x[1]
-        for i, recursion in enumerate(recursions):
-            w = dt * one[i] * u
-            z = recursion(w)
-            for row, value in enumerate((z, one[i] * z + dt * two[i] * u, recursion.growth * z + w)):
-                y[row] += (residues[i] * value).real
-        return y
-
-    return process
-
-
-def _butterworth(corner_hz: float, order: int) -> tuple[np.ndarray, np.ndarray]:
-    """Poles [rad/s] in the upper half plane and residues of the analog filter, doubled where the conjugate is left out."""
-    _, poles, gain = scipy.signal.butter(order, 2 * np.pi * corner_hz, analog=True, output="zpk")
-    apart = poles[:, None] - poles[None, :] + np.eye(order)
-    residues = gain / np.prod(apart, axis=1)
-    # A real pole comes with a rounded imaginary part, or none.
-    real = np.abs(poles.imag) < 1e-9 * np.abs(poles)
-    kept = real | (poles.imag > 0)
-    return poles[kept], (residues * np.where(real, 1, 2))[kept]
-
-
-def _phi(x: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """(eˣ - 1) / x and (eˣ - 1 - x) / x², by their series where the difference would cancel."""
-    terms = [x**k / math.factorial(k + 2) for k in range(20)]
-    two = np.where(np.abs(x) < 0.5, sum(terms), (np.exp(x) - 1 - x) / x**2)
-    return 1 + x * two, two
 
 
 def _delay_line(delay: float, dt: float) -> tuple[int, float]:
