@@ -287,6 +287,8 @@ def _over_a_substep(A: Array, B: Array, W: Array, h: float) -> tuple[Array, Arra
     block[:b, :b], block[:b, b : b + m] = A * h, B * h
     block[:b, b + m : b + m + e] = W * h
     block[b + m : b + m + e, b + m + e :] = np.eye(e)
-    expm = scipy.linalg.expm(block)[:b]
+    # A trial far from any sense may overflow: its response is not finite, and no fit goes there.
+    with np.errstate(over="ignore", invalid="ignore"):
+        expm = scipy.linalg.expm(block)[:b]
     whole, rising = expm[:, b + m : b + m + e], expm[:, b + m + e :]
     return expm[:, :b], expm[:, b : b + m], whole - rising, rising

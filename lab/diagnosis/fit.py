@@ -94,12 +94,16 @@ def cause_slopes(
     slopes = []
     for i, cause in enumerate(causes):
         for j in range(cause.n):
-            values = cause.values.copy()
-            values[j] += CAUSE_STEP
-            moved = [*causes[:i], cause.at(values), *causes[i + 1 :]]
-            slopes.append(
-                (misfit.residual(theta, moved, observer=observer, n_train=n_train) - residual) / CAUSE_STEP
-            )
+            sides = []
+            for step in (CAUSE_STEP, -CAUSE_STEP):
+                values = cause.values.copy()
+                values[j] += step
+                moved = [*causes[:i], cause.at(values), *causes[i + 1 :]]
+                sides.append(
+                    (misfit.residual(theta, moved, observer=observer, n_train=n_train) - residual) / step
+                )
+            # A delay jumps where it passes a whole sample: the smaller slope is the one that does not cross.
+            slopes.append(min(sides, key=lambda side: float(np.nan_to_num(np.sum(side**2), nan=np.inf))))
     return np.array(slopes).reshape(-1, *residual.shape)
 
 

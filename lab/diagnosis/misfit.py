@@ -15,6 +15,9 @@ from lab.effects.survey import Guess, Survey
 from lab.plant import NO_OBSERVER, Plant, ready
 from lab.twin import Twin
 
+FARTHEST = 8.0
+"""A positive variable stays within e⁸ of its scale either way: beyond, it means nothing and only overflows."""
+
 
 @dataclass(frozen=True, eq=False)
 class Hypothesis:
@@ -54,7 +57,7 @@ class Hypothesis:
         values: dict[str, Any] = dict(self.guess.fixed or {})
         for (name, scale), value in zip(self.guess.scale.items(), self.values, strict=True):
             values[name] = scale * float(
-                np.exp(np.clip(value, -40, 40)) if name in self.kind.positive else value
+                np.exp(np.clip(value, -FARTHEST, FARTHEST)) if name in self.kind.positive else value
             )
         return self.kind.of(self.location, values)
 
@@ -168,12 +171,8 @@ class Misfit:
         parts = []
         for (u, y), n in zip(self.records, n_train or self.n_train, strict=True):
             predicted = responder.outputs(u, n, observer=observer, measured=y, n_record=y.shape[1])
-            parts.append(y[:, :n] - predicted)
-        e = np.concatenate(parts, axis=1)
-        missing = np.isnan(self.measured[:, : e.shape[1]])
-        if missing.any():
-            e[missing] = 0.0
-        return e
+            parts.append(np.where(np.isnan(y[:, :n]), 0.0, y[:, :n] - predicted))
+        return np.concatenate(parts, axis=1)
 
 
 def _widened(observer: Array, plant: Plant, n: int, n_states: int) -> Array:
