@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -57,7 +57,7 @@ def parameters_of(twin: Twin, widths: Mapping[str, float] | None = None) -> Para
 def calibrate(misfit: Misfit, rig: Rig) -> Calibration:
     """The most likely parameters of the model as it is, without any cause."""
     theta = np.zeros(misfit.parameters.n)
-    misfit = replace(misfit, survey=survey_of(misfit, rig, theta, ()))
+    misfit = replace(misfit, survey=survey_of(misfit, rig, theta))
     rough = fit(misfit, theta, observer=kalman_gain(misfit, theta, SHARES[0]), iterations=4)
     theta = rough.theta
     levels = {}
@@ -71,13 +71,11 @@ def calibrate(misfit: Misfit, rig: Rig) -> Calibration:
     guided = fit(misfit, start_theta, observer=kalman_gain(misfit, start_theta, share), iterations=5)
     again = fit(misfit, guided.theta, iterations=8)
     best = min(plain, again, key=lambda f: f.objective)
-    misfit = replace(misfit, survey=survey_of(misfit, rig, best.theta, (), best.residual))
+    misfit = replace(misfit, survey=survey_of(misfit, rig, best.theta, best.residual))
     return Calibration(misfit, best, guided, share)
 
 
-def survey_of(
-    misfit: Misfit, rig: Rig, theta: Array, causes: Sequence[object], residual: Array | None = None
-) -> Survey:
+def survey_of(misfit: Misfit, rig: Rig, theta: Array, residual: Array | None = None) -> Survey:
     """How strongly the test moves the model, and where its residual has tones."""
     plant = misfit.twin.changed(*misfit.parameters.factors(theta))
     n = plant.n_dofs

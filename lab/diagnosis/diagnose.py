@@ -171,7 +171,7 @@ def _with(state: State, candidate: Candidate, rig: Rig) -> State:
     if candidate.direction is not None:
         misfit = replace(misfit, parameters=misfit.parameters.lifted(candidate.direction))
     refit = fit(misfit, found.theta, found.causes, iterations=15, refresh=2, tolerance=0.1)
-    misfit = replace(misfit, survey=survey_of(misfit, rig, refit.theta, (), refit.residual))
+    misfit = replace(misfit, survey=survey_of(misfit, rig, refit.theta, refit.residual))
     calibration = Calibration(misfit, refit, refit, 0.0)
     held_out = (*state.held_out, held_out_error(misfit, refit))
     return State(calibration, refit, (*state.accepted, candidate), state.origin, held_out)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 from os import cpu_count
@@ -124,7 +124,6 @@ def fit(
     refresh: int = 2,
     tolerance: float = 0.5,
     n_train: Sequence[int] | None = None,
-    told: Callable[[], None] | None = None,
 ) -> Fit:
     """Parameters and causes at the most likely values near where they start.
 
@@ -137,7 +136,6 @@ def fit(
         refresh: iterations for which slopes of the parameters are kept.
         tolerance: stop when an iteration with fresh slopes gains less than this in -2 log posterior.
         n_train: samples of each record to use; all training samples when None.
-        told: called once an iteration.
     """
     causes = tuple(causes)
     theta = np.asarray(theta, dtype=float)
@@ -151,8 +149,6 @@ def fit(
     prior[:n, :n] = P
     information = np.zeros((size, size))
     for _ in range(iterations):
-        if told is not None:
-            told()
         if age >= refresh:
             slopes, age = theta_slopes(misfit, theta, causes, observer, e, n_train), 0
         fresh = age == 0

@@ -35,7 +35,6 @@ class Survey:
     Attributes:
         rig: as the engineer believes it to be.
         twin: its arrays.
-        travel: RMS displacement of each degree of freedom's springs, by spring row: see `travel_of`.
         covariance: of displacements, (n_dofs, n_dofs) [m^2].
         speed_covariance: of velocities, (n_dofs, n_dofs) [m^2/s^2].
         force_rms: RMS inertia force on each degree of freedom [N].

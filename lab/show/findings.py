@@ -12,7 +12,6 @@ from lab.show.tables import with_std
 from lab.show.verdict import FAILED, FOUND, PASSED, Verdict
 
 UNKNOWN = "not known"
-OUTCOMES = {CONSISTENT: PASSED, EXPLAINED: FOUND}
 ERRORS = {
     "nominal": "model as given",
     "calibrated": "calibrated",
