@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 
 from identification.recording import Record
-from lab.cli import EXAMPLES, cli, main
+from lab.cli import cli, main
 from lab.files.recording import load, save
 
 SMALL = """
@@ -311,7 +311,7 @@ def test_view_opens_the_viewer(finished, monkeypatch):
 def test_every_help_has_an_example(capsys, name):
     assert status(name, "--help") == 0
     printed = capsys.readouterr().out
-    assert f"Example: {EXAMPLES[name]}" in " ".join(printed.split())
+    assert f"Example: lab {name}" in " ".join(printed.split())
 
 
 def test_help_answers_at_once():

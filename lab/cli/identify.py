@@ -1,0 +1,32 @@
+"""`lab identify`: modes and matrices of any recording."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import click
+
+from lab.cli.shared import example, method_options, output_options, tell, typed
+
+
+@click.command(
+    "identify", epilog=example("lab identify out/chain3/recording.h5 --method era --out out/again")
+)
+@click.argument("recording", metavar="RECORDING.h5", type=click.Path(path_type=Path))
+@output_options
+@method_options
+def command(
+    recording: Path,
+    out: Path | None,
+    force: bool,
+    as_json: bool,
+    quiet: bool,
+    method: str | None,
+    order: int | None,
+) -> None:
+    """Modes, and M, C, K where the set-up allows, of any recording, real or virtual."""
+    from lab.run import identify_file
+
+    folder = out or Path("out") / f"{recording.resolve().parent.name}_{recording.stem}"
+    result = identify_file(recording, folder, method=method, order=order, force=force, command=typed())
+    tell(result, folder, as_json, quiet)
