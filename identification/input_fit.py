@@ -7,7 +7,6 @@ from dataclasses import replace
 
 import numpy as np
 import scipy.linalg
-import scipy.signal
 
 from identification.errors import RecordingError
 from identification.recording import Array, Recording
@@ -65,6 +64,8 @@ def _n_columns(system: StateSpace, z: Complex) -> int:
 
 def _rows(system: StateSpace, recording: Recording, z: Complex, shapes: Complex) -> Iterator[Array]:
     """Regression rows [B | D | initial states | y] of outputs scaled to unit RMS, block by block."""
+    from scipy.signal import lfilter  # slow to load, and only this fit needs it
+
     n_outputs, n_inputs = system.D.shape
     size = rms(recording)[n_inputs:]
     scale = 1 / np.where(size > 0, size, 1)
@@ -77,7 +78,7 @@ def _rows(system: StateSpace, recording: Recording, z: Complex, shapes: Complex)
             n = u.shape[1]
             x = np.empty((z.size, n_inputs, n), dtype=complex)
             for r, pole in enumerate(z):
-                delayed, last = scipy.signal.lfilter([0, 1], [1, -pole], u, zi=state[r][:, None])
+                delayed, last = lfilter([0, 1], [1, -pole], u, zi=state[r][:, None])
                 x[r], state[r] = delayed, last[:, 0]
             rows = np.zeros((n_outputs, n, n_fixed + 2 * z.size * n_records + 1))
             gx = np.einsum("or,rjk->okrj", shapes, x).reshape(n_outputs, n, -1)

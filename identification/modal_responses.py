@@ -14,7 +14,6 @@ from typing import NamedTuple
 
 import numpy as np
 import scipy.linalg
-import scipy.signal
 from numpy.typing import NDArray
 
 from identification.parameterizations import Tangent
@@ -194,7 +193,9 @@ def _rows(x: Array) -> Array:
 
 def recursion(z: complex, forcing: Complex, start: Complex) -> tuple[Complex, Complex]:
     """x⁺ = z x + forcing along the last axis from `start`, and the x after the last one."""
-    x, after = scipy.signal.lfilter([0, 1], [1, -z], forcing, axis=-1, zi=start[..., None])
+    from scipy.signal import lfilter  # slow to load, and only simulations need it
+
+    x, after = lfilter([0, 1], [1, -z], forcing, axis=-1, zi=start[..., None])
     return x, after[..., 0]
 
 

@@ -67,8 +67,10 @@ class Modes:
         return int(self.frequency_hz.size)
 
     def take(self, which: ArrayLike) -> Modes:
-        """The modes at the given positions (or where a mask is true)."""
+        """The modes at the given positions (or where a mask is true); none for an empty list."""
         keep = np.asarray(which)
+        if not keep.size:
+            keep = keep.astype(np.intp)  # an empty list has no type of its own
         frequency_std, damping_std = (
             None if std is None else std[keep] for std in (self.frequency_std, self.damping_std)
         )

@@ -36,6 +36,13 @@ def modes_of(shapes):
     return Modes(np.arange(1.0, n_modes + 1), np.full(n_modes, 0.01), shapes, outputs)
 
 
+def test_no_modes_can_be_taken():
+    none = modes_of(np.ones((5, 3))).take([])
+    assert len(none) == 0
+    assert none.shapes.shape == (5, 0)
+    assert len(modes_of(np.ones((5, 3))).take([False, True, False])) == 1
+
+
 # --- Alike or not
 
 
