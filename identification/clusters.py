@@ -64,11 +64,16 @@ class Poles(NamedTuple):
     shapes: Complex
 
     @classmethod
-    def of(cls, modes: Modes, order: int = 0) -> Poles:
+    def of(cls, modes: Modes) -> Poles:
         """The poles of modes, all of one order."""
-        length = np.linalg.norm(modes.shapes, axis=0)
-        shapes = modes.shapes / np.where(length == 0, 1, length)
-        return cls(np.full(len(modes), order), modes.frequency_hz, modes.damping_ratio, shapes)
+        order = np.zeros(len(modes), dtype=np.intp)
+        return cls.normalized(order, modes.frequency_hz, modes.damping_ratio, modes.shapes)
+
+    @classmethod
+    def normalized(cls, order: Indices, frequency_hz: Array, damping_ratio: Array, shapes: Complex) -> Poles:
+        """The poles with shapes of any length brought to length one."""
+        length = np.linalg.norm(shapes, axis=0)
+        return cls(order, frequency_hz, damping_ratio, shapes / np.where(length == 0, 1, length))
 
     def take(self, which: Indices | slice) -> Poles:
         """The poles at the given positions."""

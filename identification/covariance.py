@@ -16,8 +16,11 @@ from numpy.typing import NDArray
 from identification.errors import IdentificationError, RecordingError, TooShortError
 from identification.recording import Array, Record, Recording
 
-SEGMENTS = 16
+SEGMENTS = 8
 """Segments transformed at a time: enough to spread the cost of adding spectra, few enough for the cache."""
+
+SEGMENTS_READ = 32
+"""Segments read at a time."""
 
 
 def output_covariances(
@@ -99,7 +102,7 @@ def _products(record: Record, rows: NDArray[np.intp], n: int) -> Array:
     n_outputs = record.outputs.shape[0]
     length = _transform_length(n, record.n_samples, n_outputs * rows.size)
     step = length - n
-    size = 1 << (SEGMENTS * step - 1).bit_length()
+    size = 1 << (SEGMENTS_READ * step - 1).bit_length()
     spectrum = np.zeros((length // 2 + 1, n_outputs, rows.size), complex)
     # Taking off a nearby constant first keeps a large offset from eating the digits of a small vibration.
     offset = np.mean(next(record.blocks(size))[1], axis=1, keepdims=True)
@@ -114,35 +117,43 @@ def _products(record: Record, rows: NDArray[np.intp], n: int) -> Array:
         pending = np.hstack([pending, block])
         n_segments = (pending.shape[1] - n) // step
         if n_segments > 0:
-            spectrum += _cross_spectrum(pending, rows, n_segments, step, length)
+            _add_cross_spectra(spectrum, _windows(pending, n_segments, step, length), rows, step)
             pending = pending[:, n_segments * step :]
     tail = pending[:, max(pending.shape[1] - n, 0) :].copy()
     n_segments = max(-(-pending.shape[1] // step), 1)
     pending = np.pad(pending, ((0, 0), (0, n_segments * step + n - pending.shape[1])))
-    spectrum += _cross_spectrum(pending, rows, n_segments, step, length)
+    _add_cross_spectra(spectrum, _windows(pending, n_segments, step, length), rows, step)
     products = scipy.fft.irfft(spectrum, length, axis=0, overwrite_x=True)[: n + 1]
     return np.asarray(products - _mean_part(total, head, tail, rows, record.n_samples))
 
 
 def _transform_length(n: int, n_samples: int, n_pairs: int) -> int:
-    """A power of two of several times the largest lag, as long as the cross-spectra fit in about 64 MiB."""
+    """A power of two of a few times the largest lag, as long as the cross-spectra fit in about 64 MiB."""
     largest = max(1 << 22, n_pairs) // n_pairs
     length = 1 << max(2 * n, 127).bit_length()
-    while length < min(8 * n, n_samples, largest):
+    while length < min(4 * n, n_samples, largest):
         length *= 2
     return length
 
 
-def _cross_spectrum(
-    signals: Array, rows: NDArray[np.intp], n_segments: int, step: int, length: int
-) -> NDArray[np.complex128]:
-    """Σ over segments of Y(f) R(f)ᴴ, shape (n_frequencies, n_outputs, n_references)."""
-    windows = np.lib.stride_tricks.sliding_window_view(signals, length, axis=1)[:, ::step][:, :n_segments]
-    Y = scipy.fft.rfft(windows)  # (n_outputs, n_segments, n_frequencies)
-    R = scipy.fft.rfft(windows[rows, :, :step], length)
-    return np.asarray(
-        np.ascontiguousarray(Y.transpose(2, 0, 1)) @ np.conjugate(R.transpose(2, 1, 0), order="C")
-    )
+def _windows(signals: Array, n_segments: int, step: int, length: int) -> Array:
+    """The segments, each with the samples that follow it, shape (length, n_segments, n_outputs)."""
+    windows = np.lib.stride_tricks.sliding_window_view(signals, length, axis=1)[:, ::step]
+    return windows[:, :n_segments].transpose(2, 1, 0)
+
+
+def _add_cross_spectra(
+    spectrum: NDArray[np.complex128], windows: Array, rows: NDArray[np.intp], step: int
+) -> None:
+    """Add Σ over segments of Y(f) R(f)ᴴ, shape (n_frequencies, n_outputs, n_references)."""
+    for first in range(0, windows.shape[1], SEGMENTS):
+        part = windows[:, first : first + SEGMENTS]
+        references = np.zeros((*part.shape[:2], rows.size))
+        references[:step] = part[:step, :, rows]
+        # Frequencies first, as the products want them: a copy in another order would cost as much as they.
+        Y = scipy.fft.rfft(part.transpose(0, 2, 1), axis=0)
+        R = scipy.fft.rfft(references, axis=0)
+        spectrum += Y @ np.conjugate(R, out=R)
 
 
 def _mean_part(total: Array, head: Array, tail: Array, rows: NDArray[np.intp], n_samples: int) -> Array:

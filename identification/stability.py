@@ -133,8 +133,12 @@ def _sorted_means(poles: Poles, cluster: Indices) -> tuple[Indices, Poles]:
 
 def _all_poles(realization: Realization) -> Poles:
     """One pole of each conjugate pair of every model, by rising order; real poles do not oscillate."""
-    parts = [Poles.of(system.modes(), system.n_states) for system in realization.systems]
-    return Poles(*(np.concatenate(columns, axis=-1) for columns in zip(*parts, strict=True)))
+    found = [system.modes() for system in realization.systems]
+    order = np.repeat([system.n_states for system in realization.systems], [len(modes) for modes in found])
+    columns = (
+        [getattr(modes, name) for modes in found] for name in ("frequency_hz", "damping_ratio", "shapes")
+    )
+    return Poles.normalized(order, *(np.concatenate(column, axis=-1) for column in columns))
 
 
 def _follow(poles: Poles, limits: Thresholds) -> tuple[Indices, Indices]:
