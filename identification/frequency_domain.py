@@ -8,11 +8,14 @@ from dataclasses import replace
 import numpy as np
 import scipy.linalg
 
+from identification.errors import TooShortError
 from identification.horizon import resonance_peaks
+from identification.local_response import local_response
 from identification.peaks import find_peaks
 from identification.plscf import default_degree, plscf, response_rank
 from identification.recording import Recording
 from identification.response import FrequencyResponse
+from identification.segments import choose_segments
 from identification.spectra import (
     cross_spectra,
     frequency_response,
@@ -65,7 +68,8 @@ def plscf_recording(
         degree: as for `plscf`.
         band: lowest and highest frequency fitted [Hz]; `resonance_band` when None, and all lines when the data
             are free of noise.
-        estimator: as for `frequency_response`; of no account without forces.
+        estimator: as for `frequency_response`; of no account without forces. Random records with H1 go through
+            `local_response`, which does not leak, unless `n_segment` is given.
         n_segment: likewise.
         decay: rate of the exponential window [1/s], which is undone in the models.
         references: names of the reference outputs; of no account with forces. When None all, or eight that see
@@ -105,9 +109,17 @@ def plscf_recording(
 def _forced_response(
     recording: Recording, estimator: str, n_segment: int | None, decay: float | None
 ) -> FrequencyResponse:
-    """Frequency responses; under an exponential window where a blow is all that drives the structure."""
+    """Frequency responses: by local models of random records, else of whole records or periods.
+
+    An exponential window is put on where a blow is all that drives the structure.
+    """
     if decay is not None:
         return frequency_response(recording, estimator, n_segment=n_segment, decay=decay)
+    if estimator == "H1" and n_segment is None and choose_segments(recording).kind == "stationary":
+        try:
+            return local_response(recording)
+        except TooShortError:  # a few pieces under a window must do
+            return frequency_response(recording, estimator)
     response = frequency_response(recording, estimator, n_segment=n_segment)
     blows = {record.kind for record in recording.records} <= {"pulse", "impact"}
     if not blows or n_segment is not None or response.n_averages < len(recording.inputs):
