@@ -1,0 +1,50 @@
+"""`lab check`: what is wrong with a recording before any analysis."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import click
+
+from lab.cli.shared import Doing, example, print_json
+
+
+@click.command("check", epilog=example("lab check my_test.h5 --model my_structure.xml"))
+@click.argument("recording", metavar="RECORDING.h5", type=click.Path(path_type=Path))
+@click.option("--quiet", is_flag=True, help="Print faults alone.")
+@click.option("--json", "as_json", is_flag=True, help="Print the remarks as JSON, and nothing else.")
+@click.option(
+    "--map",
+    "mapping",
+    metavar="FILE.toml",
+    type=click.Path(path_type=Path),
+    help='Renames channels: lines "name in the recording" = "name in the model".',
+)
+@click.option("--model", metavar="MODEL.xml", help="The structure in MJCF, to find channels out of place.")
+def command(recording: Path, model: str | None, mapping: Path | None, as_json: bool, quiet: bool) -> None:
+    """What to know about a recording before any analysis: dead, clipped, swapped channels and the like."""
+    from lab import catalogue
+    from lab.checks import check
+    from lab.checks.screen import document, screen
+    from lab.files.recording import load
+    from lab.matching import read_mapping, renamed
+    from lab.rig import Rig
+
+    with Doing(quiet or as_json) as doing:
+        doing("reading")
+        data = load(recording)
+        if mapping is not None:
+            data = renamed(data, read_mapping(mapping))
+        rig = (
+            None
+            if model is None
+            else Rig.load(model if Path(model).exists() else catalogue.find("models", model))
+        )
+        doing("checking")
+        remarks = check(data, rig)
+    if as_json:
+        print_json(document(data, remarks, model))
+    else:
+        text = screen(data, remarks, model, faults_alone=quiet)
+        if text:
+            click.echo(text)
