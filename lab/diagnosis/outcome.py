@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 from identification.recording import Array
 from lab.effects.effect import Effect
@@ -42,7 +42,13 @@ class Finding:
 
 @dataclass(frozen=True)
 class Alternative:
-    """Another explanation of the first finding, and how much evidence it gains."""
+    """Another explanation of the first finding.
+
+    Attributes:
+        cause, location: of the other explanation.
+        log_evidence_gain: of the model with it over the model without any, natural logarithm.
+        advice: which measurement would tell the two apart, where these data hardly do.
+    """
 
     cause: str
     location: str
@@ -81,6 +87,26 @@ class Prediction:
 
 
 @dataclass(frozen=True, eq=False)
+class SpectralPrediction:
+    """Spectra kept out of every fit and those of the three models, one row per channel or per pair of channels.
+
+    Attributes:
+        frequency_hz: (n_frequencies,).
+        measured, nominal, calibrated, extended: power spectral densities, or magnitudes of responses, (n_rows, n_frequencies).
+        names: of the rows.
+        units: of the rows.
+    """
+
+    frequency_hz: Array
+    measured: Array
+    nominal: Array
+    calibrated: Array
+    extended: Array
+    names: tuple[str, ...]
+    units: tuple[str, ...]
+
+
+@dataclass(frozen=True, eq=False)
 class Diagnosis:
     """What the model gets wrong, and the model that does not.
 
@@ -90,10 +116,13 @@ class Diagnosis:
         alternatives: of the first finding, best first.
         calibration: parameters of the model by name.
         errors: on data kept aside.
-        predictions: one per record.
+        predictions: one per record; none where the data are spectra.
         nominal: the rig as given.
         extended: the rig calibrated and with the findings.
-        warnings: what these data cannot tell, one sentence each.
+        warnings: what a careful reader should know, one sentence each.
+        spectra: where the data are spectra or frequency responses.
+        noise: of each output, by channel: RMS of what its own past does not foretell.
+        unlearnable: what these data cannot tell, one sentence each.
     """
 
     verdict: str
@@ -105,3 +134,6 @@ class Diagnosis:
     nominal: Rig
     extended: Rig
     warnings: tuple[str, ...]
+    spectra: SpectralPrediction | None = None
+    noise: Mapping[str, Quantity] = field(default_factory=dict)
+    unlearnable: tuple[str, ...] = ()

@@ -17,7 +17,10 @@ KEYS = ("verdict", "findings", "alternatives", "calibration", "fit", "warnings")
 
 
 def diagnosis_document(diagnosis: Diagnosis) -> dict[str, Any]:
-    """What `diagnosis.json` says, as plain lists, numbers and texts; None for a number that is not finite."""
+    """What `diagnosis.json` says, as plain lists, numbers and texts; None for a number that is not finite.
+
+    `advice`, `noise` and `unlearnable` may be absent from files of other writers; a reader must not ask for them.
+    """
     document = {
         "format": FORMAT,
         "version": VERSION,
@@ -38,11 +41,14 @@ def diagnosis_document(diagnosis: Diagnosis) -> dict[str, Any]:
                 "cause": other.cause,
                 "location": other.location,
                 "log_evidence_gain": other.log_evidence_gain,
+                "advice": other.advice,
             }
             for other in diagnosis.alternatives
         ],
         "calibration": {name: asdict(parameter) for name, parameter in diagnosis.calibration.items()},
         "fit": asdict(diagnosis.errors),
+        "noise": {name: asdict(quantity) for name, quantity in diagnosis.noise.items()},
+        "unlearnable": list(diagnosis.unlearnable),
         "warnings": list(diagnosis.warnings),
     }
     return dict(plain(document))

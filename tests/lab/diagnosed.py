@@ -88,5 +88,7 @@ def explained(rig: Rig, recording: Recording) -> Diagnosis:
         predicted(recording),
         rig,
         effect.apply(rig),
-        ("One shaker cannot tell its gain from a common scale of masses and stiffnesses.",),
+        ("Too short.",),
+        noise={"acc0.x": Quantity(0.02, 0.001, "m/s^2")},
+        unlearnable=("One shaker cannot tell its gain from a common scale of masses and stiffnesses.",),
     )

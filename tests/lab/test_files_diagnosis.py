@@ -36,15 +36,27 @@ def test_the_document_is_the_agreed_one(diagnosis, tmp_path):
             }
         ],
         "alternatives": [
-            {"cause": "bilinear_stiffness", "location": "spring0_1", "log_evidence_gain": 800.25},
-            {"cause": "gap_contact", "location": "spring0_1", "log_evidence_gain": -3.0},
+            {
+                "cause": "bilinear_stiffness",
+                "location": "spring0_1",
+                "log_evidence_gain": 800.25,
+                "advice": "",
+            },
+            {
+                "cause": "gap_contact",
+                "location": "spring0_1",
+                "log_evidence_gain": -3.0,
+                "advice": "A stronger push would tell a stop from a cubic.",
+            },
         ],
         "calibration": {
             "mass mass0": {"nominal": 1.0, "value": 1.002, "std": 0.001},
             "stiffness spring0_1": {"nominal": 900.0, "value": 884.0, "std": 2.0},
         },
         "fit": {"noise_floor": 0.01, "nominal": 0.3, "calibrated": 0.08, "extended": 0.0102},
-        "warnings": ["One shaker cannot tell its gain from a common scale of masses and stiffnesses."],
+        "noise": {"acc0.x": {"value": 0.02, "std": 0.001, "unit": "m/s^2"}},
+        "unlearnable": ["One shaker cannot tell its gain from a common scale of masses and stiffnesses."],
+        "warnings": ["Too short."],
     }
     assert [path.name for path in tmp_path.iterdir()] == ["diagnosis.json"]
 
