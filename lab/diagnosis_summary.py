@@ -12,6 +12,7 @@ WIDTH = 100
 MAX_ALTERNATIVES = 3
 MAX_CALIBRATED = 3
 """Parameters named: those that moved most."""
+MAX_UNLEARNABLE = 3
 
 
 def diagnosis_summary(diagnosis: Diagnosis, recording: Recording) -> str:
@@ -24,6 +25,7 @@ def diagnosis_summary(diagnosis: Diagnosis, recording: Recording) -> str:
         _columns("alternatives to the first", short),
         _columns("error on data kept aside", error_table(diagnosis)),
         _calibration(diagnosis),
+        _unlearnable(diagnosis),
         "\n".join(_filled(f"warning: {each}") for each in diagnosis.warnings),
     ]
     return "\n\n".join(part for part in parts if part)
@@ -49,6 +51,13 @@ def _calibration(diagnosis: Diagnosis) -> str:
         return ""
     listed = ", ".join(f"{name} {100 * moved[name]:+.2g} %" for name in most)
     return _filled(f"calibration moved most: {listed}")
+
+
+def _unlearnable(diagnosis: Diagnosis) -> str:
+    """What these data cannot tell; a long list is in the report."""
+    told, rest = diagnosis.unlearnable[:MAX_UNLEARNABLE], diagnosis.unlearnable[MAX_UNLEARNABLE:]
+    more = (f"and {len(rest)} more in diagnosis.json",) if rest else ()
+    return "\n".join(_filled(f"not told by these data: {each}") for each in (*told, *more))
 
 
 def _filled(text: str) -> str:

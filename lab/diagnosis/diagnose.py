@@ -11,10 +11,12 @@ import numpy as np
 from identification.recording import Array, Recording
 from lab.diagnosis import words
 from lab.diagnosis.calibrate import Calibration, calibrate, parameters_of, survey_of
+from lab.diagnosis.check import check
 from lab.diagnosis.evidence import minus_two_log_evidence
 from lab.diagnosis.fit import Fit, fit
 from lab.diagnosis.gain import errors_of, held_out_error, noise_floor, predictions_of
 from lab.diagnosis.misfit import Misfit, Parameters
+from lab.diagnosis.noise import noise_of
 from lab.diagnosis.outcome import (
     CONSISTENT,
     EXPLAINED,
@@ -26,6 +28,7 @@ from lab.diagnosis.outcome import (
     Quantity,
 )
 from lab.diagnosis.search import Candidate, search, wrong_parameters
+from lab.diagnosis.unlearnable import unlearnable
 from lab.diagnosis.whiteness import Whiteness, whiteness
 from lab.effects import EFFECTS
 from lab.effects.damping_change import DampingChange
@@ -295,6 +298,8 @@ def _outcome(
         nominal,
         extended,
         tuple(warnings),
+        noise=noise_of(state.fit.residual, recording),
+        unlearnable=(*check(recording, nominal), *unlearnable(state.misfit, state.fit)),
     )
 
 

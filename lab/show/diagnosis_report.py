@@ -13,6 +13,7 @@ from lab.show.findings import (
     calibration_table,
     error_table,
     finding_table,
+    noise_table,
     verdict_of,
 )
 from lab.show.page import checksums, inline, surroundings, template
@@ -53,6 +54,8 @@ def write_diagnosis_report(
         figures=[inline(drawing) for drawing in draw_diagnosis(diagnosis, recording)],
         notes=(),
         warnings=diagnosis.warnings,
+        unlearnable=diagnosis.unlearnable,
+        noise=noise_table(diagnosis),
         command=command,
         scenario_text="",
         facts=list({**(facts or {}), **own}.items()),

@@ -123,6 +123,15 @@ def calibration_table(diagnosis: Diagnosis) -> Table:
     return Table(("Parameter", "Nominal", "Calibrated", "Change"), rows)
 
 
+def noise_table(diagnosis: Diagnosis) -> Table:
+    """RMS of the noise of every output, with its error bar."""
+    rows = tuple(
+        (name, f"{with_std(each.value, each.std)} {each.unit.replace('^2', '²')}")
+        for name, each in diagnosis.noise.items()
+    )
+    return Table(("Output", "RMS of the noise"), rows)
+
+
 def parameter(name: str, quantity: Quantity) -> str:
     """A parameter with one standard deviation and its unit."""
     unit = "" if quantity.unit in ("", "1") else f" {quantity.unit}"

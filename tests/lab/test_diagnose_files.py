@@ -105,7 +105,7 @@ def test_quiet_says_warnings_only(engine, bench, capsys):
     assert status(*ASKED, "--quiet") == 0
     printed = capsys.readouterr()
     assert printed.out == ""
-    assert printed.err.startswith("warning: One shaker")
+    assert printed.err.startswith("warning: Too short")
     assert sorted(os.listdir(f"out/{bench.name}_test_diagnosis")) == OUTPUTS
 
 

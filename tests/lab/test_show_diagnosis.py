@@ -118,8 +118,17 @@ def test_one_screen_tells_it(diagnosis, recording):
     assert lines[0].startswith("Explained: ")
     assert "k3 = (5000000 ± 40000) N/m^3" in text
     assert "calibration moved most: stiffness spring0_1 -1.8 %, mass mass0 +0.2 %" in text
-    assert "warning: One shaker" in text
-    bare = replace(diagnosis, verdict="consistent", findings=(), alternatives=(), calibration={}, warnings=())
+    assert "warning: Too short" in text
+    assert "not told by these data: One shaker" in text
+    bare = replace(
+        diagnosis,
+        verdict="consistent",
+        findings=(),
+        alternatives=(),
+        calibration={},
+        warnings=(),
+        unlearnable=(),
+    )
     assert [block.split("\n")[0] for block in diagnosis_summary(bare, recording).split("\n\n")][1:] == [
         "error on data kept aside"
     ]
@@ -133,6 +142,8 @@ def test_the_page_says_the_verdict_first_and_needs_nothing_else(page):
         "Alternatives to the first finding",
         "Errors on data kept aside",
         "Figures",
+        "What these data cannot tell",
+        "Noise of the outputs",
         "Calibration",
         "Warnings",
         "To reproduce",
@@ -148,6 +159,8 @@ def test_the_page_says_the_verdict_first_and_needs_nothing_else(page):
         "k3 = (5000000 ± 40000) N/m^3",
         "434.2",
         "1.0020 ± 0.0010",
+        "One shaker cannot tell its gain",
+        "0.0200 ± 0.0010 m/s²",
         "SHA-256 of diagnosis.json",
     ):
         assert part in visible
