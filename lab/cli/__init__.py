@@ -13,13 +13,15 @@ from typing import NoReturn
 import click
 
 from lab.cli.diagnose import command as diagnose
+from lab.cli.export import command as export
 from lab.cli.identify import command as identify
+from lab.cli.import_ import command as import_
 from lab.cli.listing import command as listing
 from lab.cli.run import command as run
 from lab.cli.shared import example
 from lab.cli.view import command as view
 
-COMMANDS = (listing, run, identify, diagnose, view)
+COMMANDS = (listing, run, identify, diagnose, import_, export, view)
 """One file each."""
 
 

@@ -62,11 +62,11 @@ def load(path: str | Path, *, lazy: bool | None = None) -> Recording:
         FileError: no such file, not HDF5, truncated, of another format or version, or incomplete.
     """
     path = Path(path)
-    with _one_line(path):
-        file = _open(path)
+    with one_line(path):
+        file = open_file(path)
         keep_open = False
         try:
-            _check_format(file)
+            check_format(file)
             size = sum(_data(group, "outputs").size * 8 for group in _groups(file))
             on_disk = size > IN_MEMORY if lazy is None else lazy
             recording = _recording(file, on_disk)
@@ -78,7 +78,8 @@ def load(path: str | Path, *, lazy: bool | None = None) -> Recording:
 
 
 @contextmanager
-def _one_line(path: Path) -> Iterator[None]:
+def one_line(path: Path) -> Iterator[None]:
+    """Every fault of a file as one line that names it."""
     try:
         yield
     except (FileError, RecordingError) as error:
@@ -89,7 +90,12 @@ def _one_line(path: Path) -> Iterator[None]:
         ) from None
 
 
-def _open(path: Path) -> Any:
+def open_file(path: Path) -> Any:
+    """A recording file open for reading.
+
+    Raises:
+        FileError: no such file, or not HDF5.
+    """
     if not path.is_file():
         what = "is a folder" if path.is_dir() else "no such file"
         raise FileError(f"{what}; expected a recording file (HDF5)")
@@ -100,11 +106,18 @@ def _open(path: Path) -> Any:
     except OSError as error:
         raise FileError(f"cannot be opened ({error.strerror})") from None
     if not readable:
-        raise FileError("not an HDF5 file; expected a recording file, bring other formats into one first")
+        raise FileError(
+            "not an HDF5 file; expected a recording file, make one of other formats with: lab import FILE"
+        )
     return h5py.File(path, "r", locking="best-effort")
 
 
-def _check_format(file: Any) -> None:
+def check_format(file: Any) -> None:
+    """Makes sure that a file is a recording file of a version that can be read.
+
+    Raises:
+        FileError: it is not.
+    """
     form, version = _text(file.attrs.get("format")), file.attrs.get("version")
     if form != FORMAT:
         raise FileError(
@@ -121,6 +134,8 @@ def _groups(file: Any) -> list[Any]:
         if isinstance(records, h5py.Group)
         else []
     )
+    if not names and "frequency_responses" in file:
+        raise FileError("holds frequency responses and no samples; expected groups /records/0, /records/1, …")
     if not names:
         raise FileError("holds no record; expected groups /records/0, /records/1, …")
     return [records[name] for name in sorted(names, key=int)]
