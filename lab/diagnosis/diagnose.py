@@ -173,7 +173,15 @@ def _with(state: State, candidate: Candidate, rig: Rig) -> State:
     misfit, found = state.misfit, candidate.fit
     if candidate.direction is not None:
         misfit = replace(misfit, parameters=misfit.parameters.lifted(candidate.direction))
-    refit = fit(misfit, found.theta, found.causes, iterations=15, refresh=2, tolerance=0.1)
+    refit = fit(
+        misfit,
+        found.theta,
+        found.causes,
+        observer=found.observer,
+        iterations=15,
+        refresh=2,
+        tolerance=0.1,
+    )
     misfit = replace(misfit, survey=survey_of(misfit, rig, refit.theta, refit.residual))
     calibration = Calibration(misfit, refit, refit, 0.0)
     held_out = (*state.held_out, held_out_error(misfit, refit))
@@ -185,7 +193,8 @@ def _finely(state: State) -> State:
     if not any(state.misfit.plant(state.fit.theta, state.fit.causes).laws):
         return state
     misfit = replace(state.misfit, substeps=FINE_SUBSTEPS)
-    refit = fit(misfit, state.fit.theta, state.fit.causes, iterations=3, tolerance=0.5)
+    found = state.fit
+    refit = fit(misfit, found.theta, found.causes, observer=found.observer, iterations=3, tolerance=0.5)
     return replace(state, fit=refit, calibration=replace(state.calibration, misfit=misfit))
 
 
@@ -199,12 +208,20 @@ def _without_idle(state: State) -> State:
     if len(state.accepted) < 2:
         return state
     with_all = minus_two_log_evidence(state.fit)
-    for number, candidate in enumerate(state.accepted[:-1]):
+    for number, candidate in enumerate(state.accepted):
         if candidate.direction is not None:
             continue
         position = sum(c.direction is None for c in state.accepted[:number])
         causes = tuple(c for i, c in enumerate(state.fit.causes) if i != position)
-        trial = fit(state.misfit, state.fit.theta, causes, iterations=10, refresh=1, tolerance=0.1)
+        trial = fit(
+            state.misfit,
+            state.fit.theta,
+            causes,
+            observer=state.fit.observer,
+            iterations=10,
+            refresh=1,
+            tolerance=0.1,
+        )
         if minus_two_log_evidence(trial) <= with_all:
             kept = (*state.accepted[:number], *state.accepted[number + 1 :])
             errors = (*state.held_out[: number + 1], *state.held_out[number + 2 :])
@@ -232,7 +249,7 @@ def effects_of(state: State) -> list[tuple[Candidate, Effect, dict[str, Quantity
                 cause.at(cause.values - step).effect.parameters,
             )
             slopes.append([(up[name] - down[name]) / 2e-4 for name in up])
-        J = np.array(slopes).reshape(cause.n, -1)
+        J = np.array(slopes).reshape(cause.n, len(cause.effect.parameters))
         own = covariance[offset : offset + cause.n, offset : offset + cause.n]
         stds = np.sqrt(np.maximum(np.einsum("ja,jk,ka->a", J, own, J), 0.0))
         effect = cause.effect

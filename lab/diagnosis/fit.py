@@ -29,6 +29,7 @@ class Fit:
         objective: -2 log posterior up to a constant: n log of every channel's residual power, plus θᵀ P θ.
         information: Gauss-Newton information of all variables without the prior, (n, n).
         precision: P, of the prior, (n_parameters, n_parameters).
+        observer: gain that pulled the state to the measurements; no rows for the plain simulation error.
     """
 
     theta: Array
@@ -37,6 +38,7 @@ class Fit:
     objective: float
     information: Array
     precision: Array
+    observer: Array
 
     @property
     def deviance(self) -> float:
@@ -161,17 +163,23 @@ def fit(
         g = Jw @ (e * w[:, None]).ravel() + prior[:, :n] @ theta
         if not (np.all(np.isfinite(H)) and np.all(np.isfinite(g))):
             break
-        step = None
-        for _ in range(6):
-            scaled = H + damping * np.diag(np.diag(H)) + 1e-12 * np.trace(H) * np.eye(size)
-            d = -np.linalg.solve(scaled, g)
-            trial, trial_causes = theta + d[:n], moved_by(causes, d[n:])
-            trial_e = misfit.residual(trial, trial_causes, observer=observer, n_train=n_train)
-            trial_f = objective(trial_e, trial, P)
-            if trial_f < f:
-                step = f - trial_f
+        # A cause can stop at an edge, such as a delay of a whole sample: then the parameters go on without it.
+        for free in (np.arange(size), np.arange(n)) if causes else (np.arange(size),):
+            step = None
+            for _ in range(6):
+                scaled = H + damping * np.diag(np.diag(H)) + 1e-12 * np.trace(H) * np.eye(size)
+                d = np.zeros(size)
+                d[free] = -np.linalg.solve(scaled[np.ix_(free, free)], g[free])
+                trial, trial_causes = theta + d[:n], moved_by(causes, d[n:])
+                trial_e = misfit.residual(trial, trial_causes, observer=observer, n_train=n_train)
+                trial_f = objective(trial_e, trial, P)
+                if trial_f < f:
+                    step = f - trial_f
+                    break
+                damping = max(damping, 1e-3) * 8
+            if step is not None:
                 break
-            damping = max(damping, 1e-3) * 8
+            damping = 1e-3
         if step is None:
             if fresh:
                 break
@@ -182,4 +190,4 @@ def fit(
             if fresh:
                 break
             age = refresh
-    return Fit(theta, causes, e, f, information, P)
+    return Fit(theta, causes, e, f, information, P, observer)

@@ -71,13 +71,15 @@ class Hypothesis:
 
 @dataclass(frozen=True, eq=False)
 class Parameters:
-    """What the model has already: a factor on every mass, stiffness and damping, each with a prior.
+    """What the model has already: a factor on every mass, stiffness and damping, each with a prior; and unknown starts.
 
     Attributes:
         names: of the parameters.
-        widths: one standard deviation of the logarithm of each factor.
-        n_bodies, n_springs: masses come first, then stiffnesses, then dampings.
-        precision: of the prior, in widths: the identity, but for directions that were found to be wrong.
+        widths: one standard deviation of the logarithm of each factor, then the scale of each unknown of a start.
+        n_bodies, n_springs: masses come first, then stiffnesses, then dampings, then displacements and velocities at the
+            start of records that do not begin at rest.
+        precision: of the prior, in widths: the identity, but for starts and directions that were found to be wrong.
+        started: numbers of the records that do not begin at rest.
     """
 
     names: tuple[str, ...]
@@ -85,17 +87,45 @@ class Parameters:
     n_bodies: int
     n_springs: int
     precision: Array
+    started: tuple[int, ...] = ()
 
     @property
     def n(self) -> int:
         """Number of parameters."""
         return self.widths.size
 
+    @property
+    def n_factors(self) -> int:
+        """Number of masses, stiffnesses and dampings."""
+        return self.n_bodies + 2 * self.n_springs
+
     def factors(self, theta: Array) -> tuple[Array, Array, Array]:
         """Factors on masses, stiffnesses and dampings at `theta`, in units of the prior's width."""
-        factors = np.exp(np.clip(theta * self.widths, -3, 3))
+        n = self.n_factors
+        factors = np.exp(np.clip(theta[:n] * self.widths[:n], -3, 3))
         a, b = self.n_bodies, self.n_bodies + self.n_springs
         return factors[:a], factors[a:b], factors[b:]
+
+    def start(self, theta: Array, record: int) -> Array | None:
+        """Displacements and velocities at the start of a record; None where it begins at rest."""
+        if record not in self.started:
+            return None
+        of_each = (self.n - self.n_factors) // len(self.started)
+        first = self.n_factors + self.started.index(record) * of_each
+        return theta[first : first + of_each] * self.widths[first : first + of_each]
+
+    def with_start(self, record: int, scale: Array) -> Parameters:
+        """The parameters with an unknown start of one more record, its unknowns of about that scale."""
+        names = tuple(f"start {record} {i}" for i in range(scale.size))
+        precision = np.diag(np.full(self.n + scale.size, LOOSE))
+        precision[: self.n, : self.n] = self.precision
+        return replace(
+            self,
+            names=(*self.names, *names),
+            widths=np.concatenate([self.widths, scale]),
+            precision=precision,
+            started=(*self.started, record),
+        )
 
     def group(self, name: str) -> list[int]:
         """Numbers of all masses, stiffnesses or dampings."""
@@ -169,21 +199,26 @@ class Misfit:
         responder = ready(plant, self.dt, substeps=self.substeps)
         observer = _widened(observer, plant, self.twin.plant.n_dofs, responder.matrices[0].shape[0])
         parts = []
-        for (u, y), n in zip(self.records, n_train or self.n_train, strict=True):
-            predicted = responder.outputs(u, n, observer=observer, measured=y, n_record=y.shape[1])
+        for number, ((u, y), n) in enumerate(zip(self.records, n_train or self.n_train, strict=True)):
+            start = self.parameters.start(theta, number)
+            if start is not None:
+                start = _widened(start[:, None], plant, self.twin.plant.n_dofs, 2 * plant.n_dofs)[:, 0]
+            predicted = responder.outputs(
+                u, n, initial=start, observer=observer, measured=y, n_record=y.shape[1]
+            )
             parts.append(np.where(np.isnan(y[:, :n]), 0.0, y[:, :n] - predicted))
         return np.concatenate(parts, axis=1)
 
 
-def _widened(observer: Array, plant: Plant, n: int, n_states: int) -> Array:
-    """An observer of n degrees of freedom for a plant that has more of them, or lagging channels, behind."""
-    if not observer.size or observer.shape[0] == n_states:
-        return observer
-    wide = np.zeros((n_states, observer.shape[1]))
-    # What is tied to a body is corrected along with it: a rigid carry-over through its stiffness.
+def _widened(states: Array, plant: Plant, n: int, n_states: int) -> Array:
+    """States (2 n, …) of n degrees of freedom for a plant that has more of them, or lagging channels, behind."""
+    if not states.size or states.shape[0] == n_states:
+        return states
+    wide = np.zeros((n_states, states.shape[1]))
+    # What is tied to a body moves along with it: a rigid carry-over through its stiffness.
     K, m = plant.stiffness, plant.n_dofs
     carried = -np.linalg.lstsq(K[n:, n:], K[n:, :n], rcond=None)[0] if m > n else np.zeros((0, n))
     for part in range(2):
-        wide[part * m : part * m + n] = observer[part * n : (part + 1) * n]
-        wide[part * m + n : (part + 1) * m] = carried @ observer[part * n : (part + 1) * n]
+        wide[part * m : part * m + n] = states[part * n : (part + 1) * n]
+        wide[part * m + n : (part + 1) * m] = carried @ states[part * n : (part + 1) * n]
     return wide

@@ -14,11 +14,12 @@ from lab.diagnosis.fit import POOL, Fit, cause_slopes, fit, moved_by, objective,
 from lab.diagnosis.misfit import Hypothesis, Misfit
 from lab.diagnosis.observer import kalman_gain
 from lab.effects.effect import EVERYWHERE, Effect
-from lab.plant import NO_OBSERVER
 
 OWN_PARAMETERS = {"mass": "mass_change", "stiffness": "stiffness_change", "damping": "damping_change"}
 SCREEN_SAMPLES = 4096
 REFITTED, PER_CAUSE, POLISHED = 10, 2, 3
+NEGLIGIBLE = 1e-3
+"""Unknown force, as a share of the inertia forces, that nobody would miss in a model."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -30,6 +31,7 @@ class Candidate:
         location: where it sits.
         fit: with it.
         gain: 2 log evidence gained over the model without it.
+        guided: the fit on its way, while measurements still guided the state.
         direction: among the model's parameters, for a change of what the model has already.
     """
 
@@ -38,6 +40,7 @@ class Candidate:
     fit: Fit
     gain: float
     direction: Array | None = None
+    guided: Fit | None = None
 
 
 @dataclass(frozen=True, eq=False)
@@ -138,7 +141,7 @@ def search(
     misfit = calibration.misfit
     causes = present.causes
     if causes:
-        theta, observer = present.theta, NO_OBSERVER
+        theta, observer = present.theta, present.observer
     else:
         theta, observer = calibration.guided.theta, calibration.observer
     proposed = hypotheses(misfit, effects)
@@ -155,41 +158,77 @@ def search(
             picked.append(h)
             places.add(key)
     without = minus_two_log_evidence(present)
-    candidates = wrong_parameters(misfit, present, without, effects)
-    refits = [_refit(calibration, theta, causes, h) for h in picked]
-    scored = [_candidate(f, without) for f in refits if f is not None]
-    scored.sort(key=lambda c: -c.gain)
-    polished = [_candidate(_polish(misfit, c.fit), without) for c in scored[:POLISHED]]
-    best = [max(old, new, key=lambda c: c.gain) for old, new in zip(scored, polished, strict=False)]
-    candidates += best + scored[POLISHED:]
+    refits = [_refit(calibration, theta, present, h) for h in picked]
+    scored = sorted((_candidate(f, g, without) for f, g in filter(None, refits)), key=lambda c: -c.gain)
+    best = [_polished(misfit, c, without) for c in scored[:POLISHED]] + scored[POLISHED:]
+    candidates = wrong_parameters(misfit, present, without, effects) + _steadied(calibration, best, without)
     return sorted(candidates, key=lambda c: -c.gain), rows
 
 
 def _refit(
-    calibration: Calibration, theta: Array, present: Sequence[Hypothesis], h: Hypothesis
-) -> Fit | None:
-    """A complete fit with the new cause, trusting the measurements less and less."""
-    misfit, causes = calibration.misfit, (*present, h)
-    shares = [] if present else [s for s in (calibration.share, calibration.share / 10) if s > 1e-3]
+    calibration: Calibration, theta: Array, present: Fit, h: Hypothesis
+) -> tuple[Fit, Fit | None] | None:
+    """A complete fit with the new cause, trusting the measurements less and less, and the last that trusted them."""
+    misfit, causes = calibration.misfit, (*present.causes, h)
+    shares = (
+        [] if present.causes else [s for s in (calibration.share, calibration.share / 10) if s > NEGLIGIBLE]
+    )
+    guided = None
     try:
         for share in shares:
             guided = fit(
                 misfit, theta, causes, observer=kalman_gain(misfit, theta, share), iterations=3, tolerance=20
             )
             theta, causes = guided.theta, guided.causes
-        found = fit(misfit, theta, causes, iterations=8)
+        found = fit(misfit, theta, causes, observer=present.observer, iterations=8)
     except (np.linalg.LinAlgError, ValueError):
         return None
-    return found if np.isfinite(found.objective) else None
+    return (found, guided) if np.isfinite(found.objective) else None
 
 
-def _polish(misfit: Misfit, found: Fit) -> Fit:
-    return fit(misfit, found.theta, found.causes, iterations=15, refresh=1, tolerance=0.1)
+def _polished(misfit: Misfit, candidate: Candidate, without: float) -> Candidate:
+    """The candidate fitted to full convergence."""
+    found = candidate.fit
+    polished = fit(
+        misfit,
+        found.theta,
+        found.causes,
+        observer=found.observer,
+        iterations=15,
+        refresh=1,
+        tolerance=0.1,
+    )
+    return max(candidate, _candidate(polished, candidate.guided, without), key=lambda c: c.gain)
 
 
-def _candidate(found: Fit, without: float) -> Candidate:
+def _steadied(calibration: Calibration, candidates: list[Candidate], without: float) -> list[Candidate]:
+    """The candidates, the one that follows the measurements best given another try if its simulation lost them.
+
+    Behind gaps and freeplay neighbouring motions part so fast that a simulation over the whole record fits nothing. An
+    unknown force too small to matter keeps it near the measurements, and the fit is led there step by step.
+    """
+    led = [c for c in candidates if c.guided is not None]
+    if not led:
+        return candidates
+    first = min(led, key=lambda c: c.guided.objective if c.guided else np.inf)
+    misfit, guided = calibration.misfit, first.guided
+    assert guided is not None
+    if first.fit.objective <= guided.objective or not misfit.plant(guided.theta, guided.causes).laws:
+        return candidates
+    theta, causes, share = guided.theta, guided.causes, calibration.share
+    steps = np.geomspace(share / 10, NEGLIGIBLE, max(int(2 * np.log10(share / 10 / NEGLIGIBLE)), 0) + 1)
+    for share in steps:
+        observer = kalman_gain(misfit, theta, share)
+        guided = fit(misfit, theta, causes, observer=observer, iterations=8, tolerance=5)
+        theta, causes = guided.theta, guided.causes
+    steadied = _candidate(guided, first.guided, without)
+    return [steadied if c is first and steadied.gain > c.gain else c for c in candidates]
+
+
+def _candidate(found: Fit, guided: Fit | None, without: float) -> Candidate:
     last = found.causes[-1]
-    return Candidate(last.kind.cause, last.location, found, without - minus_two_log_evidence(found))
+    gain = without - minus_two_log_evidence(found)
+    return Candidate(last.kind.cause, last.location, found, gain, guided=guided)
 
 
 def wrong_parameters(

@@ -12,6 +12,9 @@ from identification.recording import Array
 LAGS = 40
 LEVEL = 1e-3
 """Probability that white noise fails the test."""
+MATTERS = 0.05
+"""Share of a residual's power that must be predictable for it to count: in a long record any two simulators differ
+significantly, and what is below a twentieth of the noise nobody would miss in a prediction."""
 
 
 @dataclass(frozen=True)
@@ -24,6 +27,7 @@ class Whiteness:
         channel: output with the largest correlation.
         lag: in samples.
         with_input: number of the input it correlates with; None for its own past.
+        share: of the residual's power that its past and the inputs predict, in the channel where that is most.
     """
 
     largest: float
@@ -31,11 +35,12 @@ class Whiteness:
     channel: int
     lag: int
     with_input: int | None
+    share: float
 
     @property
     def passed(self) -> bool:
-        """Whether the residual passes for noise."""
-        return self.largest <= self.limit
+        """Whether the residual passes for noise, or for so little more that nobody would miss it."""
+        return self.largest <= self.limit or self.share <= MATTERS
 
 
 def whiteness(residual: Array, inputs: Array) -> Whiteness:
@@ -55,13 +60,29 @@ def whiteness(residual: Array, inputs: Array) -> Whiteness:
     tests = own.size + cross.size
     limit = float(scipy.stats.norm.isf(LEVEL / (2 * max(tests, 1))))
     k, i = np.unravel_index(np.argmax(np.abs(own)), own.shape)
-    best = Whiteness(float(np.sqrt(n) * np.abs(own[k, i])), limit, int(i), int(k) + 1, None)
+    share = _predictable(e, u)
+    best = Whiteness(float(np.sqrt(n) * np.abs(own[k, i])), limit, int(i), int(k) + 1, None, share)
     if cross.size:
         j, k, i = np.unravel_index(np.argmax(np.abs(cross)), cross.shape)
         size = float(np.sqrt(n) * np.abs(cross[j, k, i]))
         if size > best.largest:
-            best = Whiteness(size, limit, int(i), int(k), int(j))
+            best = Whiteness(size, limit, int(i), int(k), int(j), share)
     return best
+
+
+def _predictable(e: Array, u: Array) -> float:
+    """Largest share of a channel's power that a regression on its past and on the inputs explains, adjusted for its size."""
+    n = e.shape[1] - LAGS
+    driven = [row[LAGS - k : LAGS - k + n] for row in u for k in range(LAGS)]
+    shares = []
+    for row in e:
+        regressors = np.array([row[LAGS - k : LAGS - k + n] for k in range(1, LAGS + 1)] + driven)
+        target = row[LAGS:]
+        found = np.linalg.lstsq(regressors @ regressors.T, regressors @ target, rcond=1e-10)[0]
+        left = target - found @ regressors
+        freedom = max(n - len(regressors), 1)
+        shares.append(1 - (left @ left / freedom) / max(target @ target / n, 1e-300))
+    return float(max(shares))
 
 
 def _normalized(rows: Array) -> Array:
