@@ -1,4 +1,4 @@
-"""How far the randomness of a record moves the poles that its output covariances give.
+"""How far the randomness of a record moves the poles of `ssi_cov`, `ssi_data` and `next_era`.
 
 A pole z of a model with H = O Γ moves by a (dH(1) - z dH(0)) b with a = ψᴴ O⁺ and b = Γ⁺ φ. Each covariance
 is a mean of products over time, and so is this: of [α(t + 1) - z α(t)] β(t), where α gathers the outputs
@@ -52,13 +52,13 @@ def covariance_scatter(
     *,
     references: Sequence[str] | None = None,
 ) -> tuple[Array, Array]:
-    """Standard deviations of frequencies and damping ratios from `ssi_cov`.
+    """Standard deviations of frequencies and damping ratios from models that rest on output covariances.
 
     Args:
         recording: the one that was realized.
-        realization: by `ssi_cov`.
+        realization: by `ssi_cov`, `ssi_data` or `next_era`.
         poles: order and continuous-time pole [rad/s] of each mode.
-        references: as for `ssi_cov`.
+        references: those that the method was given.
 
     Returns:
         Of the frequencies [Hz] and of the damping ratios, shape (n_poles,) each.
@@ -100,26 +100,46 @@ def _influence(
         int(realization.settings[name]) for name in ("n_rows", "n_columns", "stride", "n_references")
     )
     n_outputs, rows = len(recording.outputs), reference_rows(recording, references)
+    # NExT-ERA shifts all block rows, the others all but the last.
+    ahead = n_rows if realization.method == "next_era" else n_rows - 1
     R = output_covariances(recording, n_rows + stride * (n_columns - 1), references=references)
     scale = balance(R, recording, rows)
     past = range(0, stride * n_columns, stride)
-    H = np.hstack([R[lag : lag + n_rows].reshape(-1, rows.size) for lag in past])
-    a = np.empty((len(poles), n_rows - 1, n_outputs), dtype=complex)
+    weight = np.eye(n_columns * n_references)
+    if realization.method == "ssi_data":
+        weight = _whitening(recording, rows, past, scale)
+    H = np.hstack([R[lag : lag + n_rows].reshape(-1, rows.size) for lag in past]) @ weight
+    a = np.empty((len(poles), ahead, n_outputs), dtype=complex)
     b = np.zeros((len(poles), stride * (n_columns - 1) + 1, n_references), dtype=complex)
     z = np.empty(len(poles), dtype=complex)
     for order in {order for order, _ in poles}:
         system = realization.at(order)
         observed = observability(system.A, system.C / scale, n_rows)
-        right = np.linalg.pinv(np.linalg.pinv(observed) @ H)  # Γ⁺
-        left = np.linalg.pinv(observed[:-n_outputs])
+        right = weight @ np.linalg.pinv(np.linalg.pinv(observed) @ H)  # Γ⁺
+        left = np.linalg.pinv(observed[: ahead * n_outputs])
         values, psi, phi = scipy.linalg.eig(system.A, left=True, right=True)
         for k in (k for k, (own, _) in enumerate(poles) if own == order):
             i = int(np.argmin(np.abs(values - np.exp(poles[k][1] * recording.dt))))
             z[k] = values[i]
-            weight = psi[:, i].conj() / (psi[:, i].conj() @ phi[:, i])
-            a[k] = (weight @ left).reshape(n_rows - 1, n_outputs)
+            vector = psi[:, i].conj() / (psi[:, i].conj() @ phi[:, i])
+            a[k] = (vector @ left).reshape(ahead, n_outputs)
             b[k, ::stride] = (right @ phi[:, i]).reshape(n_columns, n_references)
     return Influence(z, np.asarray(a / scale[:, 0]), np.asarray(b / scale[rows, 0]))
+
+
+def _whitening(recording: Recording, rows: NDArray[np.intp], past: range, scale: Array) -> Array:
+    """L⁻ᵀ with L Lᵀ the covariance of the past: H L⁻ᵀ is the projection of the future, up to a rotation.
+
+    How L moves does not move the poles, as it changes Γ alone in H = O Γ.
+    """
+    names = [recording.outputs[row].name for row in rows]
+    R = output_covariances(recording, past[-1] + 1, references=names, first_lag=0)[:, rows]
+    R /= scale[rows] * scale[rows, 0]
+    block = [[R[q - p] if q >= p else R[p - q].T for q in past] for p in past]
+    # Where outputs tell the same twice, the inverse root leaves out what they have in common.
+    w, V = scipy.linalg.eigh(np.block(block))
+    seen = w > np.finfo(float).eps * w.size * w[-1]
+    return np.asarray(V[:, seen] / np.sqrt(w[seen]))
 
 
 def _series(record: Record, rows: NDArray[np.intp], influence: Influence) -> Iterator[Complex]:

@@ -2,7 +2,7 @@
 
 - `era`: the residual's noise, to first order through the Hankel matrix (`pulse_scatter`).
 - `okid_era`: the residual's noise through the observer's regression (`observer_scatter`).
-- `ssi_cov`: the record's own randomness, as the mean of a series in time (`covariance_scatter`).
+- `ssi_cov`, `ssi_data`, `next_era`: the record's own randomness, as the mean of a series in time (`covariance_scatter`).
 - any other method on stationary records: parts left out in turn (`resampling`).
 
 Over repeated tests the truth lies within ±2 of them about 95 % of the time, as long as the method itself has no
@@ -30,6 +30,7 @@ from identification.pulse_scatter import pulse_tangent
 from identification.recording import Array, Recording
 from identification.resampling import jackknife_std
 from identification.second_order import second_order
+from identification.settled import NESTED
 from identification.systems import Realization, SecondOrder
 
 STEP = 1e-6
@@ -74,7 +75,7 @@ def modes_with_error_bars(
     if not places:
         return modes
     given = dict(settings or {})
-    if realization.method == "ssi_cov":
+    if realization.method in NESTED:
         std = covariance_scatter(recording, realization, places, references=given.get("references"))
     elif realization.method in ("era", "okid_era"):
         std = _from_tangents(recording, realization, places)
