@@ -16,6 +16,7 @@ from identification.modes import Modes
 from identification.output_only import horizon_warning
 from identification.recording import Recording
 from identification.second_order import second_order
+from identification.settled import NESTED, settle
 from identification.stability import Stabilization, stabilize
 from identification.systems import Realization, SecondOrder
 from identification.uncertainty import Placed, matrices_with_error_bars, modes_with_error_bars
@@ -79,6 +80,12 @@ def identify(
     if stabilization is None or chosen.finds_order or order is not None:
         modes, places = realization.system.modes().normalized(), None
         stable = _stays_put(modes, stabilization)
+    elif name in NESTED and len(stabilization.modes):
+        settled = settle(stabilization)
+        modes, places = settled.modes, [Placed(*place) for place in settled.places]
+        stable = (True,) * len(modes)
+        realization = replace(realization, order=settled.order)
+        notes += (settled.note,)
     else:
         modes, places = stabilization.modes, first_settled(stabilization)
         stable = (True,) * len(modes)
