@@ -2,11 +2,8 @@
 
 from __future__ import annotations
 
-import numpy as np
-
-from identification.recording import Array
 from lab.checks.remark import Remark
-from lab.checks.survey import Sheet, Survey
+from lab.checks.survey import Survey
 
 LOW = 0.6
 """Share of an output's power that the inputs must explain."""
@@ -26,7 +23,7 @@ def coherence(survey: Survey) -> list[Remark]:
         m, n = sheet.n_inputs, sheet.lines.n_pieces
         if not m or n < 4 * m + 8 or sheet.record.kind not in STATIONARY:
             continue
-        for t, share in zip(sheet.traces()[m:], explained(sheet), strict=True):
+        for t, share in zip(sheet.traces()[m:], sheet.lines.explained(), strict=True):
             if not share < LOW:
                 continue
             remarks.append(
@@ -43,16 +40,3 @@ def coherence(survey: Survey) -> list[Remark]:
                 )
             )
     return remarks
-
-
-def explained(sheet: Sheet) -> Array:
-    """Share of each output's power that the inputs explain, shape (n_outputs,); NaN for a silent one."""
-    m, n = sheet.n_inputs, sheet.lines.n_pieces
-    uu, yu = sheet.lines.cross[:, :m], sheet.lines.cross[:, m:]
-    yy = sheet.lines.power[m:].T
-    inverse = np.linalg.pinv(uu, rcond=1e-10, hermitian=True)
-    told = np.einsum("fyu,fuv,fyv->fy", yu, inverse, yu.conj()).real
-    # The lowest lines hold what the window leaves of the mean.
-    total, part = yy[2:].sum(axis=0), told[2:].sum(axis=0)
-    share = np.divide(part, total, out=np.full(total.size, np.nan), where=total > 0)
-    return np.asarray(1 - (1 - share) * n / (n - m))

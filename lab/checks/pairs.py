@@ -8,20 +8,44 @@ import numpy as np
 import scipy.optimize
 
 from identification.identify import identify
-from identification.modes import Complex, Modes, mac
+from identification.modes import Complex, Modes
 from identification.recording import Array, Recording
+from lab.checks.arrangement import balanced, best_arrangement, macs
 from lab.rig import Rig
 
-NEAR = 0.2
-"""Relative distance within which a mode at the written rate is the model's."""
+Matching = list[tuple[int, int]]
+"""Positions of modes that belong together: measured, modelled."""
+
+NEAR = 0.4
+"""Logarithm of the ratio of frequencies within which a mode at the written rate can be the model's."""
 
 TIGHT = 0.04
 """The same after a common factor, which must be one for all modes."""
 
+ALIKE = 0.6
+"""MAC from which on a pair speaks for its shapes, below which against them."""
+
+STRETCHED = 0.2
+"""What a pair loses for each unit of the logarithm of its ratio of frequencies."""
+
+LEFT_OUT = 0.2
+"""What is lost for a mode of the model left out below the highest pair; half of it for a measured one."""
+
+CHANGE = 0.03
+"""What is lost for each channel in another place or with another sign."""
+
+FREE = 3
+"""Pairs from which on another order of the channels can be told from other pairs."""
+
 BAND = 0.8
 """Share of half the sample rate up to which modes are compared."""
 
-MAX_PAIRS = 7
+MAX_MODES = 8
+MAX_PAIRS = 5
+MAX_CHOICES = 1000
+FITS = 0.85
+"""Mean MAC at which shapes agree, although the model is only nominal."""
+
 COMPLEX = 0.3
 """Share of a measured shape's power out of phase, from which on it is no mode shape."""
 
@@ -71,26 +95,86 @@ def pairs_of(recording: Recording, rig: Rig) -> Pairs | None:
     modelled = modelled.take(seen & (modelled.damping_ratio < 0.7))
     if not len(measured) or not len(modelled):
         return None
-    at_rate = _matched(measured, modelled, 1.0, NEAR)
-    best, score = at_rate, _score(measured, modelled, at_rate)
-    # Another rate must bring at least three modes together, and better than the written one does.
-    if score < 0.9 * min(len(measured), len(modelled)):
+    measured, modelled = (modes.take(np.arange(min(len(modes), MAX_MODES))) for modes in (measured, modelled))
+    phi, psi = _real(measured.shapes), _real(modelled.shapes)
+    best, score = _as_named(measured, modelled, phi, psi), 0.0
+    if best:
+        score = float(np.sum(_values(best, phi, psi)))
+    if not best or score < FITS * len(best):
+        # Another rate must bring at least three modes together, and better than the written one does.
         for ratio in np.unique(np.divide.outer(measured.frequency_hz, modelled.frequency_hz)):
             other = _matched(measured, modelled, float(ratio), TIGHT)
-            value = _score(measured, modelled, other)
-            if len(other) >= 3 and value > max(1.5 * score, 0.8 * len(other), 2.5):
+            value = float(np.sum(_values(other, phi, psi))) if len(other) >= 3 else 0.0
+            if value > max(1.3 * score, FITS * len(other), 2.5):
                 best, score = other, value
+    if not best or score < FITS * len(best):
+        best = _in_any_order(measured, modelled, phi, psi) or best
     if not best and len(measured) == 1 == len(modelled):
         best = [(0, 0)]
     if not best:
         return None
     rows, columns = np.array(best)[:MAX_PAIRS].T
-    return Pairs(
-        _real(measured.shapes[:, rows]),
-        _real(modelled.shapes[:, columns]),
-        measured.frequency_hz[rows],
-        modelled.frequency_hz[columns],
+    return Pairs(phi[:, rows], psi[:, columns], measured.frequency_hz[rows], modelled.frequency_hz[columns])
+
+
+def _as_named(measured: Modes, modelled: Modes, phi: Array, psi: Array) -> Matching:
+    """The rising pairs that agree best with the channels as they are named."""
+    return max(
+        _rising(measured, modelled),
+        key=lambda pairs: np.sum(_values(pairs, phi, psi) - ALIKE) - _stretch(pairs, measured, modelled),
+        default=[],
     )
+
+
+def _in_any_order(measured: Modes, modelled: Modes, phi: Array, psi: Array) -> Matching:
+    """The rising pairs that agree best when channels may change places, signs and factors."""
+    best, highest = [], 0.0
+    for pairs in _rising(measured, modelled):
+        if len(pairs) < (FREE if len(phi) > 2 else 2):
+            continue
+        rows, columns = np.array(pairs).T
+        for a, b in ((phi, psi), (balanced(phi[:, rows]), balanced(psi[:, columns]))):
+            a, b = (a[:, rows], b[:, columns]) if a is phi else (a, b)
+            found = best_arrangement(a, b)
+            score = float(np.sum(macs(found.arranged(a), b) - ALIKE)) - _stretch(pairs, measured, modelled)
+            score -= CHANGE * found.n_changes
+            if score > highest:
+                best, highest = pairs, score
+    return best
+
+
+def _rising(measured: Modes, modelled: Modes) -> list[Matching]:
+    """All choices of pairs that rise together in both sets, each within `NEAR`, up to `MAX_PAIRS` of them."""
+    apart = np.abs(np.log(np.divide.outer(measured.frequency_hz, modelled.frequency_hz)))
+    near = [(int(i), int(j)) for i, j in np.argwhere(apart < NEAR)]
+    found: list[Matching] = []
+
+    def grow(pairs: Matching, rest: Matching) -> None:
+        if pairs:
+            found.append(pairs)
+        if len(pairs) < MAX_PAIRS and len(found) < MAX_CHOICES:
+            for i, j in rest:
+                grow([*pairs, (i, j)], [(k, m) for k, m in rest if k > i and m > j])
+
+    grow([], near)
+    return found
+
+
+def _stretch(pairs: Matching, measured: Modes, modelled: Modes) -> float:
+    """What pairs lose for frequencies that lie apart and for modes left out between and below them."""
+    rows, columns = np.array(pairs).T
+    left_out = LEFT_OUT * float(columns[-1] + 1 - len(pairs)) + LEFT_OUT / 2 * float(
+        rows[-1] + 1 - len(pairs)
+    )
+    return left_out + STRETCHED * float(
+        np.sum(np.abs(np.log(measured.frequency_hz[rows] / modelled.frequency_hz[columns])))
+    )
+
+
+def _values(pairs: Matching, phi: Array, psi: Array) -> Array:
+    """MAC of each pair with the channels as they are named."""
+    rows, columns = np.array(pairs).T
+    return macs(phi[:, rows], psi[:, columns])
 
 
 def _credible(modes: Modes, sample_rate: float) -> Modes:
@@ -107,12 +191,7 @@ def _real(shapes: Complex) -> Array:
     return np.asarray((turned / np.linalg.norm(shapes, axis=0)).real)
 
 
-def _matched(measured: Modes, modelled: Modes, ratio: float, near: float) -> list[tuple[int, int]]:
+def _matched(measured: Modes, modelled: Modes, ratio: float, near: float) -> Matching:
     apart = np.abs(np.log(np.divide.outer(measured.frequency_hz, ratio * modelled.frequency_hz)))
     rows, columns = scipy.optimize.linear_sum_assignment(np.minimum(apart, 2 * near))
     return [(int(i), int(j)) for i, j in zip(rows, columns, strict=True) if apart[i, j] < near]
-
-
-def _score(measured: Modes, modelled: Modes, pairs: list[tuple[int, int]]) -> float:
-    """Sum of the MAC over pairs, with the channels as they are named."""
-    return float(sum(mac(measured.shapes[:, [i]], modelled.shapes[:, [j]])[0, 0] for i, j in pairs))

@@ -7,7 +7,8 @@ import numpy as np
 from identification.errors import IdentificationError
 from identification.recording import Array
 from identification.spectra import frequency_response
-from lab.checks.layout import balanced, chosen_layout, mean_mac
+from lab.checks.arrangement import balanced, mean_mac
+from lab.checks.layout import chosen_arrangement
 from lab.checks.remark import Remark
 from lab.checks.survey import Survey
 
@@ -47,10 +48,10 @@ def _among_outputs(survey: Survey) -> list[Remark]:
     assert pairs is not None
     if pairs.measured.size < 2 or len(survey.recording.outputs) < 3:
         return []
-    chosen = chosen_layout(pairs, same_units=survey.same_units)
+    chosen = chosen_arrangement(pairs, same_units=survey.same_units)
     if chosen is None:
         return []
-    phi, psi = pairs.measured_shapes[chosen.order] * chosen.signs[:, None], pairs.modelled_shapes
+    phi, psi = chosen.arranged(pairs.measured_shapes), pairs.modelled_shapes
     if mean_mac(phi, psi) > 0.95:
         return []
     factors = _row_factors(phi, psi)
@@ -92,7 +93,7 @@ def _from_inputs(survey: Survey) -> list[Remark]:
     measured_inputs = recording.inputs and all(record.inputs.shape[0] for record in recording.records)
     if not measured_inputs or pairs is None:
         return []
-    chosen = chosen_layout(pairs, same_units=survey.same_units)
+    chosen = chosen_arrangement(pairs, same_units=survey.same_units)
     if len(recording.outputs) > 1 and pairs.measured.size > 1 and (chosen is None or not chosen.as_named):
         return []  # first things first
     try:
