@@ -1,0 +1,146 @@
+"""Blind trials of the diagnosis: hide something, hand over only the recording and the nominal model, check the answer.
+
+Cases are drawn from seeds, family by family. Data with causes of the catalogue are made by MuJoCo, those with other laws by a
+Runge-Kutta integrator of their own; the diagnosis explains with its fast twin, which takes part in neither. Answers are
+appended to a file of JSON lines, and a run that was stopped goes on where it was. Printed are, per family: cause and place
+right, false alarms, parameters within two standard deviations and their median relative error, held-out gain, verdicts and
+seconds; then detection against the best possible test, what was said of every cause, and every answer that is not right.
+
+    python benchmarks/blind.py [--cases 24] [--seed 0] [--family singles sparse …] [--only CAUSE] [--withhold]
+                               [--strength 1 0.3 0.1] [--jobs 1] [--out blind.jsonl] [--write DIR] [--table]
+"""
+
+from __future__ import annotations
+
+import argparse
+import itertools
+import json
+import os
+import sys
+import time
+from concurrent.futures import ProcessPoolExecutor
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+# Matrices here are small: threads would cost more than they bring.
+os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
+sys.path.insert(0, str(Path(__file__).resolve().parent.parent))
+
+import numpy as np
+
+from benchmarks.blind_cases.draw import FAMILIES, draw
+from benchmarks.blind_cases.judge import judged, said
+from benchmarks.blind_cases.table import tables
+from benchmarks.blind_cases.truth import Case
+from identification.errors import IdentificationError
+from lab.diagnosis.diagnose import diagnose
+from lab.effects import EFFECTS
+from lab.errors import LabError
+from lab.files.recording import save
+from lab.rig import Rig
+
+
+@dataclass(frozen=True)
+class Trial:
+    """One case to be drawn, and how it is to be asked."""
+
+    family: str
+    seed: int
+    only: str | None = None
+    withheld: bool = False
+    strength: float = 1.0
+
+    @property
+    def key(self) -> dict[str, Any]:
+        """Plain data that tells trials apart."""
+        return vars(self)
+
+
+def answered(trial: Trial, write: Path | None = None) -> dict[str, Any]:
+    """The judged answer of one trial."""
+    case = draw(trial.seed, trial.family, only=trial.only, strength=trial.strength)
+    if write is not None:
+        written(case, write / f"{trial.family}_{trial.seed}")
+    effects = dict(EFFECTS)
+    if trial.withheld:
+        for hidden in case.hidden:
+            effects.pop(hidden.cause, None)
+    start = time.perf_counter()
+    try:
+        diagnosis = diagnose(case.recording, Rig.from_xml(case.xml), effects=effects)
+    except (LabError, IdentificationError, ArithmeticError, ValueError, AssertionError) as error:
+        return {**trial.key, "error": f"{case!r}: {type(error).__name__}: {error}"}
+    seconds = time.perf_counter() - start
+    return {**trial.key, **judged(case, diagnosis, withheld=trial.withheld), "seconds": seconds}
+
+
+def written(case: Case, folder: Path) -> None:
+    """Writes a case as files: what `lab diagnose` takes, and the truth beside them."""
+    folder.mkdir(parents=True, exist_ok=True)
+    (folder / "model.xml").write_text(case.xml, encoding="utf-8")
+    save(case.recording, folder / "recording.h5", dtype=np.float32)
+    findings = [
+        {"cause": h.cause, "location": h.location, "parameters": dict(h.parameters)} for h in case.hidden
+    ]
+    truth = {"seed": case.seed, "findings": findings, "jitter": int(case.jitter)}
+    truth["lookalike"] = not all(h.exact for h in case.hidden)
+    (folder / "truth.json").write_text(json.dumps(truth, indent=1), encoding="utf-8")
+
+
+def read(path: Path) -> list[dict[str, Any]]:
+    """Answers so far."""
+    if not path.exists():
+        return []
+    return [json.loads(line) for line in path.read_text(encoding="utf-8").splitlines() if line.strip()]
+
+
+def run(trials: list[Trial], path: Path, *, jobs: int, write: Path | None) -> None:
+    """Answers the trials that the file does not have, one line each."""
+    known = {json.dumps({name: row[name] for name in vars(Trial("", 0))}) for row in read(path)}
+    todo = [trial for trial in trials if json.dumps(trial.key) not in known]
+    places = [write] * len(todo)
+    with path.open("a", encoding="utf-8") as file, ProcessPoolExecutor(jobs) as pool:
+        rows = map(answered, todo, places) if jobs == 1 else pool.map(answered, todo, places)
+        for number, row in enumerate(rows, start=1):
+            file.write(json.dumps(row) + "\n")
+            file.flush()
+            result = (
+                row.get("error")
+                or f"{'right' if row['place_right'] else 'WRONG'}  {said(row)}  {row['seconds']:.1f} s"
+            )
+            names = "+".join(f"{c}@{p}" for c, p, _ in row.get("hidden", [])) or "nothing"
+            print(
+                f"{number}/{len(todo)} {row['family']} {row['seed']} {names}: {result}",
+                file=sys.stderr,
+                flush=True,
+            )
+
+
+def main(arguments: list[str] | None = None) -> None:
+    """Runs the trials and prints the tables."""
+    parser = argparse.ArgumentParser(description=(__doc__ or "").partition("\n")[0])
+    parser.add_argument("--cases", type=int, default=24, help="per family")
+    parser.add_argument("--seed", type=int, default=0, help="of the first case of every family")
+    parser.add_argument("--family", nargs="+", choices=list(FAMILIES), default=list(FAMILIES))
+    parser.add_argument("--only", help="hide this cause only")
+    parser.add_argument("--withhold", action="store_true", help="take the hidden cause out of the catalogue")
+    parser.add_argument("--strength", type=float, nargs="+", default=[1.0], help="times the usual sizes")
+    parser.add_argument("--jobs", type=int, default=1)
+    parser.add_argument("--out", type=Path, default=Path("blind.jsonl"), help="answers, one JSON line each")
+    parser.add_argument("--write", type=Path, help="folder for the cases as files")
+    parser.add_argument("--table", action="store_true", help="print the answers in the file and stop")
+    options = parser.parse_args(arguments)
+
+    if not options.table:
+        seeds = range(options.seed, options.seed + options.cases)
+        trials = [
+            Trial(family, seed, options.only, options.withhold, strength)
+            for seed, family, strength in itertools.product(seeds, options.family, options.strength)
+        ]
+        run(trials, options.out, jobs=options.jobs, write=options.write)
+    print(tables(read(options.out)))
+
+
+if __name__ == "__main__":
+    main()
