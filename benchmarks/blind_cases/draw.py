@@ -72,16 +72,19 @@ FAMILIES = {
 }
 
 
-def draw(seed: int, family: str, *, only: str | None = None, strength: float = 1.0) -> Case:
+def draw(
+    seed: int, family: str, *, kind: Family | None = None, only: str | None = None, strength: float = 1.0
+) -> Case:
     """A case of a family.
 
     Args:
         seed: what everything is drawn from; consecutive seeds go through the causes one after the other.
         family: name in `FAMILIES`.
+        kind: what the family is, where it is to differ from that table.
         only: the cause to hide, instead of the seed's own.
         strength: times the family's size of the effect.
     """
-    kind = FAMILIES[family]
+    kind = kind or FAMILIES[family]
     rng = np.random.default_rng([seed, zlib.crc32(family.encode())])
     printed = draw_truss(rng) if kind.masses is None else _network(kind, kind.masses, rng)
     jitter = kind.hides == "nothing" or bool(rng.random() < 0.5)
