@@ -1,0 +1,1 @@
+"""Diagnosis from spectra: recordings without measured forces, and frequency responses."""

@@ -1,0 +1,272 @@
+"""Diagnose spectra: what a model gets wrong where no force was measured, or where only frequency responses are known."""
+
+from __future__ import annotations
+
+import itertools
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+
+from identification.recording import Recording
+from identification.response import FrequencyResponse
+from lab.diagnosis.calibrate import Calibration, parameters_of
+from lab.diagnosis.diagnose import State, calibrated_rig, calibration_of, effects_of, evidence_threshold
+from lab.diagnosis.misfit import Parameters
+from lab.diagnosis.outcome import (
+    CONSISTENT,
+    EXPLAINED,
+    UNEXPLAINED,
+    Alternative,
+    Diagnosis,
+    Errors,
+    Finding,
+    Quantity,
+)
+from lab.diagnosis.search import Candidate
+from lab.diagnosis.spectral.experiment import Experiment
+from lab.diagnosis.spectral.fit import SpectralFit, fit
+from lab.diagnosis.spectral.recorded import Recorded
+from lab.diagnosis.spectral.responses import Responses
+from lab.diagnosis.spectral.search import drifting, search
+from lab.diagnosis.spectral.tones import FoundTone
+from lab.diagnosis.spectral.transfer import Complex
+from lab.diagnosis.words import advice, says
+from lab.effects import EFFECTS
+from lab.effects.effect import Effect
+from lab.rig import Rig
+from lab.twin import twin
+
+MOST_FINDINGS = 4
+RIGID = 1e12
+"""Precision of a prior that lets a parameter not move."""
+
+
+@dataclass(frozen=True, eq=False)
+class Stage:
+    """How far a diagnosis of spectra has come.
+
+    Attributes:
+        experiment: the data, tones that were named taken out.
+        likelihood: of its training part.
+        fit: parameters, causes and nuisances so far.
+        accepted: causes so far.
+        held_out: error on data kept aside, of the calibrated model and after each cause.
+    """
+
+    experiment: Experiment
+    likelihood: Any
+    fit: SpectralFit
+    accepted: tuple[Candidate | FoundTone, ...]
+    held_out: tuple[float, ...]
+
+
+def diagnose_spectra(
+    data: Recording | FrequencyResponse,
+    rig: Rig,
+    *,
+    baseline: Recording | FrequencyResponse | None = None,
+    widths: Mapping[str, float] | None = None,
+    effects: Mapping[str, type[Effect]] = EFFECTS,
+    band: tuple[float, float] | None = None,
+    progress: Callable[[str], None] | None = None,
+) -> Diagnosis:
+    """What the model gets wrong in spectra of outputs, or in frequency responses, and the model that does not.
+
+    A recording is compared through its cross-spectra with the model under white forces, each held over a sample, on every
+    degree of freedom, or where the recording's input channels say if it names any; their intensities and the noise of
+    every channel are fitted along. Errors are relative errors of the spectral matrix, whitened by the model's own; those of
+    responses are RMS over RMS.
+
+    Args:
+        data: outputs without measured forces, or frequency responses.
+        rig: what the engineer believes; its channels must have the names of the data's.
+        baseline: likewise, of the same rig in its known state; it calibrates the model first.
+        widths: prior standard deviations, relative, by group ("mass", "stiffness", "damping") or parameter.
+        effects: the causes that may be named, as far as such data can show them.
+        band: lowest and highest frequency used [Hz]; all when None.
+        progress: told what is being done.
+
+    Returns:
+        The diagnosis, with `spectra` in place of predictions sample by sample.
+
+    Raises:
+        LabError: data and model do not fit together, or the data are too short.
+
+    Source: Whittle (1953), Ark. Mat. 2, 423-434, for the likelihood; Schwarz (1978), Ann. Stat. 6, for the evidence.
+    """
+    tell = progress or (lambda what: None)
+    rig = nominal = rig.connected(
+        inputs=[channel.name for channel in data.inputs], outputs=[channel.name for channel in data.outputs]
+    )
+    model = twin(rig)
+    parameters = parameters_of(model, widths)
+    if baseline is not None:
+        tell("calibrating on the baseline")
+        known = _calibrated(_experiment(baseline, rig, band, share=1.0), rig, parameters)
+        rig = calibrated_rig(known.likelihood, known.fit.theta, rig)
+        parameters, model = _tightened(parameters, known.fit), twin(rig)
+    tell("calibrating")
+    stage = origin = _calibrated(_experiment(data, rig, band), rig, parameters)
+    visible = {name: kind for name, kind in effects.items() if name in stage.experiment.visible}
+    first: list[Candidate | FoundTone] = []
+    while len(stage.accepted) < MOST_FINDINGS:
+        tell("searching for causes" if not stage.accepted else f"searching on, {len(stage.accepted)} found")
+        ranked, looks = _ranked(stage, visible)
+        first = first or ranked
+        if not ranked or ranked[0].gain < evidence_threshold(looks):
+            break
+        stage = _with(stage, ranked[0])
+    return _outcome(stage, origin, nominal, rig, first)
+
+
+def _experiment(
+    data: Recording | FrequencyResponse,
+    rig: Rig,
+    band: tuple[float, float] | None,
+    share: float | None = None,
+) -> Experiment:
+    if isinstance(data, FrequencyResponse):
+        return Responses.of(data, band=band, whole=share == 1.0)
+    model = twin(rig)
+    return Recorded.of(data, rig, model, band=band, **({} if share is None else {"share": share}))
+
+
+def _calibrated(experiment: Experiment, rig: Rig, parameters: Parameters) -> Stage:
+    """The model's own parameters at their most likely values, without any cause."""
+    likelihood = experiment.likelihood(twin(rig), parameters, rig)
+    found = fit(likelihood, np.zeros(parameters.n), (), likelihood.nuisance_mean)
+    likelihood = experiment.surveyed(likelihood, found.nuisance)
+    return Stage(experiment, likelihood, found, (), ())
+
+
+def _tightened(parameters: Parameters, known: SpectralFit) -> Parameters:
+    """The parameters with prior widths shrunk to what a baseline left open, never below a tenth of a percent."""
+    spread = np.sqrt(np.diag(known.covariance))[: parameters.n]
+    return replace(parameters, widths=np.maximum(parameters.widths * np.minimum(spread, 1.0), 1e-3))
+
+
+def _ranked(stage: Stage, effects: Mapping[str, type[Effect]]) -> tuple[list[Candidate | FoundTone], int]:
+    """Candidates for one more cause, best first, and how many were looked at."""
+    steady = {
+        name: kind
+        for name, kind in effects.items()
+        if name not in ("stiffness_drift", "unmeasured_force", "line_hum")
+    }
+    candidates, looks = search(stage.likelihood, stage.fit, steady)
+    tones, places = stage.experiment.tones(stage.likelihood, stage.fit, effects)
+    parts = stage.experiment.in_parts(stage.likelihood) if "stiffness_drift" in effects else None
+    drifts, springs = ([], 0) if parts is None else drifting(parts, stage.fit, effects["stiffness_drift"])
+    found: list[Candidate | FoundTone] = [*candidates, *tones, *drifts]
+    return sorted(found, key=lambda c: -c.gain), looks + places + springs
+
+
+def _with(stage: Stage, chosen: Candidate | FoundTone) -> Stage:
+    """The stage with one more cause accepted, everything refitted together."""
+    experiment, likelihood, start = stage.experiment, stage.likelihood, stage.fit
+    if isinstance(chosen, FoundTone):
+        experiment = experiment.without(chosen)
+        likelihood = experiment.again(likelihood)
+    else:
+        assert isinstance(chosen.fit, SpectralFit)
+        start = chosen.fit
+        if chosen.cause == "stiffness_drift":
+            likelihood = experiment.in_parts(likelihood)
+        if chosen.direction is not None:
+            likelihood = replace(likelihood, parameters=likelihood.parameters.lifted(chosen.direction))
+    refit = fit(likelihood, start.theta, start.causes, start.nuisance)
+    likelihood = experiment.surveyed(likelihood, refit.nuisance)
+    held_out = (*(stage.held_out or (_held_out_error(stage),)),)
+    found = Stage(experiment, likelihood, refit, (*stage.accepted, chosen), held_out)
+    return replace(found, held_out=(*held_out, _held_out_error(found)))
+
+
+def _held_out_error(stage: Stage) -> float:
+    held_out = stage.experiment.held_out(stage.likelihood)
+    return stage.experiment.error(held_out, _predicted(held_out, stage.fit))
+
+
+def _predicted(likelihood: Any, found: SpectralFit) -> Complex:
+    return np.asarray(likelihood.predict(found.theta, found.causes, found.nuisance))
+
+
+def _as_given(likelihood: Any, found: SpectralFit) -> SpectralFit:
+    """The model as given: no parameter moves, only what it cannot know is fitted."""
+    rigid = replace(likelihood.parameters, precision=RIGID * np.eye(found.theta.size))
+    return fit(
+        replace(likelihood, parameters=rigid), np.zeros(found.theta.size), (), likelihood.nuisance_mean
+    )
+
+
+def _named(stage: Stage) -> list[tuple[Candidate | FoundTone, Effect, Mapping[str, Quantity]]]:
+    """The accepted causes at their fitted size, with error bars."""
+    candidates = tuple(c for c in stage.accepted if isinstance(c, Candidate))
+    fitted = iter(effects_of(_state(stage, candidates)))
+    return [(c, c.effect, c.parameters) if isinstance(c, FoundTone) else next(fitted) for c in stage.accepted]
+
+
+def _state(stage: Stage, accepted: tuple[Candidate, ...]) -> State:
+    """The stage as a diagnosis sample by sample keeps it: names are the same, and what is asked of it is there."""
+    found: Any = stage.fit
+    return State(Calibration(stage.likelihood, found, found, 0.0), found, accepted, found, ())
+
+
+def _outcome(
+    stage: Stage, origin: Stage, nominal: Rig, rig: Rig, first: list[Candidate | FoundTone]
+) -> Diagnosis:
+    named = _named(stage)
+    extended = calibrated_rig(stage.likelihood, stage.fit.theta, rig)
+    for c, effect, _ in named:
+        if isinstance(c, FoundTone) or c.direction is None:
+            extended = effect.apply(extended)
+    given = _as_given(origin.likelihood, origin.fit)
+    kept = origin.experiment.held_out(origin.likelihood)
+    clean = stage.experiment.held_out(stage.likelihood)
+    predicted = (_predicted(kept, given), _predicted(kept, origin.fit), _predicted(clean, stage.fit))
+    floor = stage.experiment.floor(clean, predicted[2])
+    errors = Errors(
+        floor,
+        origin.experiment.error(kept, predicted[0]),
+        origin.experiment.error(kept, predicted[1]),
+        stage.experiment.error(clean, predicted[2]),
+    )
+    shares = _shares(stage.held_out, floor)
+    findings = [
+        Finding(effect, quantities, 0.5 * c.gain, share, says(effect, quantities))
+        for (c, effect, quantities), share in zip(named, shares, strict=True)
+    ]
+    warnings = stage.experiment.warnings(stage.likelihood, origin.likelihood)
+    left = stage.experiment.left(stage.likelihood, _predicted(stage.likelihood, stage.fit))
+    return Diagnosis(
+        UNEXPLAINED if left else EXPLAINED if findings else CONSISTENT,
+        tuple(sorted(findings, key=lambda f: -f.holdout_gain)),
+        _alternatives(first) if findings else (),
+        calibration_of(_state(stage, ())),
+        errors,
+        (),
+        nominal,
+        extended,
+        tuple([left, *warnings] if left else warnings),
+        spectra=origin.experiment.shown(kept, predicted),
+    )
+
+
+def _shares(errors: tuple[float, ...], floor: float) -> list[float]:
+    """Share of the calibrated model's excess error on data kept aside that each cause removed, 0 to 1."""
+    if not errors:
+        return []
+    excess = max(errors[0] - floor, 1e-12)
+    return [float(np.clip((a - b) / excess, 0.0, 1.0)) for a, b in itertools.pairwise(errors)]
+
+
+def _alternatives(first: list[Candidate | FoundTone]) -> tuple[Alternative, ...]:
+    """The next best explanations of the first finding."""
+    told = first[0]
+    return tuple(
+        Alternative(
+            c.cause, c.location, 0.5 * c.gain, advice(told.cause, c.cause, 0.5 * (told.gain - c.gain))
+        )
+        for c in first[1:6]
+        if c.gain > 0
+    )
