@@ -15,6 +15,7 @@ from types import ModuleType
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
+    from lab.checks import check
     from lab.compare import compare
     from lab.excitation import EXCITATIONS
     from lab.files.recording import load as load_recording
@@ -31,6 +32,7 @@ _WHERE = {
     "Result": ("lab.result", "Result"),
     "Rig": ("lab.rig", "Rig"),
     "Scenario": ("lab.scenario", "Scenario"),
+    "check": ("lab.checks", "check"),
     "compare": ("lab.compare", "compare"),
     "identify_file": ("lab.run", "identify_file"),
     "instrument": ("lab.instruments", "instrument"),
@@ -46,6 +48,7 @@ __all__ = [
     "Result",
     "Rig",
     "Scenario",
+    "check",
     "compare",
     "identify_file",
     "instrument",

@@ -2,13 +2,19 @@
 
 from __future__ import annotations
 
+import numpy as np
+
 from lab.checks.remark import Remark
 from lab.checks.survey import Survey
 
 LOW = 0.6
 """Share of an output's power that the inputs must explain."""
 
-STATIONARY = ("random", "multisine")
+GOOD = 0.85
+"""Mean coherence of the best twentieth of the lines, from which on low values are those of resonances that ring for
+longer than a piece."""
+
+STATIONARY = ("random",)
 
 
 def coherence(survey: Survey) -> list[Remark]:
@@ -23,8 +29,10 @@ def coherence(survey: Survey) -> list[Remark]:
         m, n = sheet.n_inputs, sheet.lines.n_pieces
         if not m or n < 4 * m + 8 or sheet.record.kind not in STATIONARY:
             continue
-        for t, share in zip(sheet.traces()[m:], sheet.lines.explained(), strict=True):
-            if not share < LOW:
+        for t, share in zip(sheet.traces()[m:], sheet.explained(), strict=True):
+            column = np.sort(sheet.coherence[2:, t.row - m])
+            best = float(np.mean(column[-max(column.size // 20, 1) :]))
+            if not (share < LOW and best < GOOD):
                 continue
             remarks.append(
                 Remark(

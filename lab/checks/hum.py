@@ -6,7 +6,7 @@ import numpy as np
 
 from lab.checks.lines import NEAR, OFF, Complex, folded
 from lab.checks.remark import Remark
-from lab.checks.survey import Survey
+from lab.checks.survey import Sheet, Survey
 
 RISK = 1e-7
 """Chance that a line of a channel without hum stands out so far."""
@@ -17,6 +17,9 @@ STEADY = 0.7
 MIN_PIECES = 8
 SHARE = 3e-3
 """Amplitude worth a word, over the RMS of the channel."""
+
+PUSHED = 1e-4
+"""Power of an input at a line, over its largest anywhere, that explains a line of the outputs."""
 
 DRIVEN = ("sweep", "multisine", "other")
 
@@ -35,7 +38,7 @@ def hum(survey: Survey) -> list[Remark]:
             continue
         for line, near in sheet.lines.mains.items():
             found = [_amplitude(near[row]) for row in range(len(sheet.channels))]
-            driven = sheet.record.kind in DRIVEN and any(a > 0 for a in found[: sheet.n_inputs])
+            driven = sheet.record.kind in DRIVEN and _pushed(sheet, line)
             for t in sheet.traces():
                 amplitude, rms = found[t.row], float(sheet.levels.rms[t.row])
                 if driven or amplitude <= SHARE * rms:
@@ -56,6 +59,13 @@ def hum(survey: Survey) -> list[Remark]:
                     )
                 )
     return _strongest(remarks)
+
+
+def _pushed(sheet: Sheet, line: float) -> bool:
+    """Whether an input has power at a line."""
+    k = round(folded(line, sheet.sample_rate) * sheet.lines.length / sheet.sample_rate)
+    power = sheet.lines.power[: sheet.n_inputs]
+    return bool(np.any(np.max(power[:, k - 2 : k + 3], axis=1) > PUSHED * np.max(power, axis=1)))
 
 
 def _amplitude(near: Complex) -> float:

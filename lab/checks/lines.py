@@ -48,20 +48,20 @@ class Lines:
     sample_rate: float
     mains: Mapping[float, Complex]
 
-    def explained(self) -> Array:
-        """Share of each output's power that the inputs explain, shape (n_outputs,); NaN for a silent one.
+    def coherence(self) -> Array:
+        """Multiple coherence of each output with the inputs, shape (n_lines, n_outputs); 0 for a silent one.
 
-        Freed of its bias: n pieces and m inputs explain m / n of any noise.
+        Freed of its bias: n pieces and m inputs explain m / n of any noise. Never below zero.
+
+        Source: Bendat and Piersol (2010), Random Data, eqs. (7.35) and (9.75).
         """
         n, m = self.n_pieces, self.cross.shape[2]
         uu, yu = self.cross[:, :m], self.cross[:, m:]
         yy = self.power[m:].T
         inverse = np.linalg.pinv(uu, rcond=1e-10, hermitian=True)
         told = np.einsum("fyu,fuv,fyv->fy", yu, inverse, yu.conj()).real
-        # The lowest lines hold what the window leaves of the mean.
-        total, part = yy[2:].sum(axis=0), told[2:].sum(axis=0)
-        share = np.divide(part, total, out=np.full(total.size, np.nan), where=total > 0)
-        return np.asarray(1 - (1 - share) * n / max(n - m, 1))
+        share = np.divide(told, yy, out=np.zeros(yy.shape), where=yy > 0)
+        return np.asarray(np.maximum(1 - (1 - share) * n / max(n - m, 1), 0.0))
 
 
 def piece_length(n_samples: int) -> int:

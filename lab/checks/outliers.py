@@ -71,7 +71,7 @@ def outliers_of(blocks: Blocks, levels: Levels) -> list[tuple[Outlier, ...]]:
             if levels.rms[row] > 0:
                 y = _filled(line[row] - levels.mean[row])
                 if models[row] is None:
-                    models[row] = _autoregression(y)
+                    models[row] = autoregression(y)
                 found[row] += _in_block(y, models[row], start, at == 0, levels, row)
         tail = line[:, -(REACH + ORDER) :] if line.shape[1] > REACH + ORDER else line
         at += x.shape[1]
@@ -96,10 +96,10 @@ def _filled(x: Array) -> Array:
     return np.asarray(np.where(last >= 0, x[np.maximum(last, 0)], 0.0))
 
 
-def _autoregression(y: Array) -> Array | None:
+def autoregression(y: Array, order: int = ORDER) -> Array | None:
     """π of the channel, from up to 2^16 of its samples; None for too short a record."""
     n = y.size
-    order = min(ORDER, n // 20)
+    order = min(order, n // 20)
     if order < 1:
         return None
     y = y[: 1 << 16].copy()

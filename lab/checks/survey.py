@@ -6,13 +6,14 @@ from collections.abc import Iterator
 from functools import cached_property
 
 import numpy as np
+import scipy.signal
 
 from identification.errors import IdentificationError
 from identification.recording import Array, Channel, Record, Recording
 from lab.checks.extremes import Extremes, extremes_of
 from lab.checks.levels import Levels, levels_of
 from lab.checks.lines import Lines, lines_of
-from lab.checks.outliers import Outlier, outliers_of
+from lab.checks.outliers import Outlier, autoregression, outliers_of
 from lab.checks.pairs import Pairs, pairs_of
 from lab.checks.remark import Trace
 from lab.rig import Rig
@@ -20,6 +21,9 @@ from lab.rig import Rig
 RANDOM = ("random", "other")
 HELPFUL = 0.7
 """Share of the outputs' power that inputs must explain for modes to be found with their help."""
+
+WHITENING = 32
+"""Order of the filters that flatten spectra."""
 
 BLOCK_VALUES = 1 << 21
 """Values held in memory at a time."""
@@ -63,6 +67,35 @@ class Sheet:
     def lines(self) -> Lines:
         """Spectra of the record."""
         return lines_of(self.blocks, self.n_samples, len(self.channels), self.n_inputs, self.sample_rate)
+
+    @cached_property
+    def coherence(self) -> Array:
+        """Multiple coherence of the outputs with the inputs, shape (n_lines, n_outputs).
+
+        It is that of the outputs behind a filter that makes their spectra flat: the same for any filter, and long
+        ringing does not leak out of the pieces.
+        """
+        flat = lines_of(self._whitened, self.n_samples, len(self.channels), self.n_inputs, self.sample_rate)
+        return flat.coherence()
+
+    def explained(self) -> Array:
+        """Share of each output's power that the inputs explain, shape (n_outputs,); NaN for a silent one."""
+        # The lowest lines hold what the window leaves of the mean.
+        power = self.lines.power[self.n_inputs :, 2:].T
+        total, part = power.sum(axis=0), (power * self.coherence[2:]).sum(axis=0)
+        return np.asarray(np.divide(part, total, out=np.full(total.size, np.nan), where=total > 0))
+
+    def _whitened(self, *, multiple: int = 1) -> Iterator[Array]:
+        filters: list[Array] | None = None
+        for x in self.blocks(multiple=multiple):
+            if filters is None:
+                known = (autoregression(np.nan_to_num(row - np.nanmean(row)), WHITENING) for row in x)
+                filters = [np.ones(1) if pi is None else pi for pi in known]
+                memory = [np.zeros(pi.size - 1) for pi in filters]
+            flat = x.copy()
+            for row in range(self.n_inputs, len(x)):
+                flat[row], memory[row] = scipy.signal.lfilter(filters[row], [1.0], x[row], zi=memory[row])
+            yield flat
 
     @cached_property
     def outliers(self) -> tuple[tuple[Outlier, ...], ...]:
@@ -114,7 +147,7 @@ class Survey:
     def _to_identify(self) -> Recording:
         """The recording, without inputs that explain too little of a random motion to be of help."""
         random = all(sheet.record.kind in RANDOM and sheet.n_inputs for sheet in self.sheets)
-        if random and np.nanmedian(self.sheets[0].lines.explained()) < HELPFUL:
+        if random and np.nanmedian(self.sheets[0].explained()) < HELPFUL:
             return self.recording.select(inputs=[])
         return self.recording
 

@@ -12,6 +12,7 @@ from typing import NoReturn
 
 import click
 
+from lab.cli.check import command as check
 from lab.cli.diagnose import command as diagnose
 from lab.cli.export import command as export
 from lab.cli.identify import command as identify
@@ -21,7 +22,7 @@ from lab.cli.run import command as run
 from lab.cli.shared import example
 from lab.cli.view import command as view
 
-COMMANDS = (listing, run, identify, diagnose, import_, export, view)
+COMMANDS = (listing, run, check, identify, diagnose, import_, export, view)
 """One file each."""
 
 
