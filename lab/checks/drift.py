@@ -7,6 +7,7 @@ import scipy.fft
 import scipy.stats
 
 from identification.recording import Array
+from lab.checks.jumps import level_jumps
 from lab.checks.remark import Remark
 from lab.checks.survey import Survey
 
@@ -43,6 +44,8 @@ def drift(survey: Survey) -> list[Remark]:
             if t.is_input or not sheet.levels.rms[t.row] > 0:
                 continue
             cell = cells[t.row]
+            if level_jumps(sheet, t.row):
+                continue  # told already
             chance, slow = _chance(_cosines(cell[None])[0], U)
             size = float(np.ptp(_wave(slow, cell.size)))
             if chance > RISK or size < SHARE * sheet.levels.rms[t.row]:

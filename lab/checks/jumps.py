@@ -8,7 +8,7 @@ from lab.checks.outliers import Outlier
 from lab.checks.remark import Remark
 from lab.checks.spikes import MIN_STEPS
 from lab.checks.surprises import own_surprises
-from lab.checks.survey import Survey
+from lab.checks.survey import Sheet, Survey
 
 SHARE = 0.2
 """Size of a jump worth a word, over the RMS of its channel."""
@@ -21,13 +21,10 @@ def jumps(survey: Survey) -> list[Remark]:
     """Outputs whose level jumps and stays, as when an encoder loses counts or an amplifier switches range."""
     remarks = []
     for sheet in survey.sheets:
-        v = sheet.levels
         for t in sheet.traces():
             if t.is_input:
                 continue
-            floor = max(SHARE * v.rms[t.row], MIN_STEPS * v.step[t.row])
-            found = _lasting(own_surprises(sheet, t.row, "jump"), sheet.outliers[t.row])
-            found = [o for o in found if abs(o.size) > floor]
+            found = level_jumps(sheet, t.row)
             if not found:
                 continue
             top = max(found, key=lambda o: abs(o.size))
@@ -47,6 +44,13 @@ def jumps(survey: Survey) -> list[Remark]:
                 )
             )
     return remarks
+
+
+def level_jumps(sheet: Sheet, row: int) -> list[Outlier]:
+    """Jumps of one channel that last and are worth a word."""
+    floor = max(SHARE * sheet.levels.rms[row], MIN_STEPS * sheet.levels.step[row])
+    found = _lasting(own_surprises(sheet, row, "jump"), sheet.outliers[row])
+    return [o for o in found if abs(o.size) > floor]
 
 
 def _lasting(jumps: Sequence[Outlier], others: Sequence[Outlier]) -> list[Outlier]:

@@ -72,7 +72,12 @@ def outliers_of(blocks: Blocks, levels: Levels) -> list[tuple[Outlier, ...]]:
                 y = _filled(line[row] - levels.mean[row])
                 if models[row] is None:
                     models[row] = autoregression(y)
-                found[row] += _in_block(y, models[row], start, at == 0, levels, row)
+                new = _in_block(y, models[row], start, at == 0, levels, row)
+                gone = ~np.isfinite(line[row])
+                # What stands in for a missing sample is no surprise.
+                found[row] += [
+                    o for o in new if not gone[max(o.sample - start - 2, 0) : o.sample - start + 2].any()
+                ]
         tail = line[:, -(REACH + ORDER) :] if line.shape[1] > REACH + ORDER else line
         at += x.shape[1]
     return [tuple(_once(each)) for each in found]
