@@ -7,7 +7,7 @@ from collections.abc import Mapping
 from lab.compare import Comparison
 from lab.result import Criterion
 
-AT_LEAST = ("modes", "mac")
+AT_LEAST = ("modes", "mac", "effects_found", "verdict_right")
 """Criteria whose value must not fall below the limit; all others must not exceed it."""
 
 

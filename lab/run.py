@@ -41,7 +41,8 @@ def run(
 
     Args:
         scenario: the test, or the file that defines it.
-        out: folder to come, with recording.h5, result.json, report.html and run.rrd.
+        out: folder to come, with recording.h5, result.json, report.html and run.rrd; and a folder diagnosis where the
+            scenario asks for one.
         force: replace an earlier output there.
         command: how the test was called, for the report.
         progress: told how far the simulation is.
@@ -58,6 +59,8 @@ def run(
         chosen = scenario.identification
         result = examine(recording, chosen.method, order=chosen.order, dofs=touched(rig), **chosen.settings)
         result = replace(held_against(truth_of(scenario, rig), result, scenario), title=scenario.title)
+        if scenario.diagnosis is not None:
+            result = _diagnosed(folder / "diagnosis", result, recording, scenario, command)
         present(folder, result, recording, scenario=scenario, rig=rig, command=command)
     return result
 
@@ -174,6 +177,31 @@ def held_against(rig: Rig, result: Result, scenario: Scenario) -> Result:
         comparison=comparison,
         criteria=judge(scenario.criteria.model_dump(), comparison),
     )
+
+
+def _diagnosed(
+    folder: Path, result: Result, recording: Recording, scenario: Scenario, command: str
+) -> Result:
+    """The result with the diagnosis judged; the folder holds what `lab diagnose` writes."""
+    # Imported here because few scenarios are diagnosed, and the search for causes is slow to load.
+    from lab.diagnose_files import present_diagnosis
+    from lab.diagnosis.diagnose import diagnose
+    from lab.diagnosis.judge import judge_diagnosis
+    from lab.show.findings import verdict_of
+
+    asked = scenario.diagnosis
+    assert asked is not None
+    # Titled before, so that the report names the test.
+    recording = replace(recording, title=scenario.title)
+    diagnosis = diagnose(recording, model_of(scenario), widths=asked.widths)
+    folder.mkdir()
+    facts = {"Scenario": scenario.title, "Model": scenario.model}
+    present_diagnosis(folder, diagnosis, recording, command=command, facts=facts)
+    judged = judge_diagnosis(
+        diagnosis, scenario.hidden(), verdict=asked.verdict, parameter_error=asked.parameter_error
+    )
+    said = f"Diagnosis, in the folder diagnosis: {verdict_of(diagnosis, recording).sentence}"
+    return replace(result, criteria=(*result.criteria, *judged), notes=(*result.notes, said))
 
 
 def _record(path: Path, rig: Rig, scenario: Scenario, progress: Progress | None) -> None:

@@ -7,7 +7,7 @@ import json
 import tomllib
 from collections.abc import Mapping
 from pathlib import Path
-from typing import Annotated, Any
+from typing import Annotated, Any, Literal, get_args
 
 from pydantic import (
     BaseModel,
@@ -92,6 +92,20 @@ class Identification(Table):
     settings: dict[str, Any] = {}
 
 
+class Diagnosing(Table):
+    """The recording is also diagnosed, with the model as its file says; the effects hidden are what it must find.
+
+    Attributes:
+        widths: relative tolerance of the model's parameters, by group ("mass", "stiffness", "damping") or by name.
+        verdict: what it must come to; when left out, explained with hidden effects and consistent without.
+        parameter_error: largest error of a parameter found, in its own standard deviations.
+    """
+
+    widths: dict[str, PositiveFloat] = {}
+    verdict: Literal["consistent", "explained", "unexplained"] | None = None
+    parameter_error: PositiveFloat = 4.0
+
+
 class Criteria(Table):
     """What the test must reach.
 
@@ -125,6 +139,7 @@ class Scenario(Table):
         channels: which actuators and sensors are connected.
         instruments: what measures.
         identification: how the recording is identified.
+        diagnosis: what a diagnosis of the recording must find; none is made when left out.
         criteria: what the test must reach.
     """
 
@@ -137,6 +152,7 @@ class Scenario(Table):
     channels: Channels = Channels()
     instruments: Instruments = Instruments()
     identification: Identification = Identification()
+    diagnosis: Diagnosing | None = None
     criteria: Criteria = Criteria()
     _folder: Path = PrivateAttr(default=Path())
     _text: str = PrivateAttr(default="")
@@ -264,6 +280,5 @@ def _keys(tables: list[str]) -> list[str]:
     model: type[BaseModel] = Scenario
     for table in tables:
         annotation = model.model_fields[table].annotation
-        assert isinstance(annotation, type)
-        model = annotation
+        model = next(kind for kind in (annotation, *get_args(annotation)) if isinstance(kind, type))
     return list(model.model_fields)

@@ -6,10 +6,16 @@ import time
 import pytest
 
 from lab import catalogue
+from lab.files.diagnosis import load_diagnosis
 from lab.files.recording import load
 from lab.run import run
+from lab.scenario import load_scenario
 
 SCENARIOS = catalogue.files("scenarios")
+
+
+def diagnosis_file(folder):
+    return folder / "out/diagnosis/diagnosis.json"
 
 
 @pytest.mark.slow
@@ -24,6 +30,11 @@ def test_scenario(path, tmp_path):
     document = json.loads((tmp_path / "out/result.json").read_text("utf-8"))
     assert [mode["frequency_hz"] for mode in document["modes"]] == list(result.modes.frequency_hz)
     assert load(tmp_path / "out/recording.h5").outputs == result.modes.outputs
+    asked = load_scenario(path)
+    assert (tmp_path / "out/diagnosis").exists() == (asked.diagnosis is not None)
+    if asked.diagnosis is not None:
+        named = {(c["cause"], c["location"]) for c in load_diagnosis(diagnosis_file(tmp_path))["findings"]}
+        assert named == {(effect.cause, effect.location) for effect in asked.hidden()}
 
 
 def test_the_founding_scenarios_are_there():

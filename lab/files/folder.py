@@ -16,6 +16,7 @@ OUTPUTS = {
     "result.json",
     "report.html",
     "run.rrd",
+    "diagnosis",
     "diagnosis.json",
     "extended.xml",
     "placement.json",

@@ -111,6 +111,16 @@ def test_changed():
         ),
         ("[0.1, 5.0]", "5.0", "band = 5.0 in [excitation]"),
         ('["acc2.x"]', '["acc2.x", 7]', "outputs[1] = 7 in [channels]: input should be a valid string"),
+        (
+            "[criteria]",
+            "[diagnosis]\nwidth = 1\n[criteria]",
+            "unknown key 'width' in [diagnosis]; allowed are widths, verdict, parameter_error",
+        ),
+        (
+            "[criteria]",
+            '[diagnosis]\nverdict = "guilty"\n[criteria]',
+            "verdict = 'guilty' in [diagnosis]: input should be 'consistent', 'explained' or 'unexplained'",
+        ),
         ("seed = 3", "seed = -1", "seed = -1 at the top"),
         ("order = 6", "order = 6.5", "order = 6.5 in [identification]"),
         ("[test]", "[test", "is not TOML"),
