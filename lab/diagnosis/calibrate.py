@@ -11,6 +11,7 @@ from identification.recording import Array
 from lab.diagnosis.fit import Fit, fit
 from lab.diagnosis.misfit import Misfit, Parameters
 from lab.diagnosis.observer import kalman_gain
+from lab.diagnosis.starts import best_starts, moving, starts_of, with_starts
 from lab.effects.survey import Survey
 from lab.plant import Path, ready
 from lab.rig import Rig
@@ -65,6 +66,11 @@ def calibrate(misfit: Misfit, rig: Rig) -> Calibration:
         gain = kalman_gain(misfit, theta, share)
         levels[share] = fit(misfit, theta, observer=gain, iterations=2, tolerance=5).objective
     plain = fit(misfit, theta, iterations=8)
+    late = moving(misfit, plain)
+    if late:
+        misfit = with_starts(misfit, late)
+        theta, begun = (np.append(t, np.zeros(misfit.parameters.n - t.size)) for t in (theta, plain.theta))
+        plain = fit(misfit, begun, iterations=8)
     levels[0.0] = plain.objective
     share = min(levels, key=lambda s: levels[s])
     start_theta = theta if share else plain.theta
@@ -90,7 +96,15 @@ def survey_of(misfit: Misfit, rig: Rig, theta: Array, residual: Array | None = N
         order=(),
     )
     responder = ready(probe, misfit.dt)
-    motion = np.concatenate([responder.outputs(u, y.shape[1]) for u, y in misfit.records], axis=1)
+    # Before any fit, a free decay begins as suits the model as given.
+    starts = starts_of(misfit, theta) if np.any(theta) else best_starts(misfit)
+    motion = np.concatenate(
+        [
+            responder.outputs(u, y.shape[1], initial=start)
+            for (u, y), start in zip(misfit.records, starts, strict=True)
+        ],
+        axis=1,
+    )
     q, v, a = motion[:n], motion[n : 2 * n], motion[2 * n :]
     outputs = np.concatenate([y for _, y in misfit.records], axis=1)
     inputs = np.concatenate([u for u, _ in misfit.records], axis=1)

@@ -14,7 +14,7 @@ from lab.diagnosis.calibrate import Calibration, calibrate, parameters_of, surve
 from lab.diagnosis.check import check
 from lab.diagnosis.evidence import minus_two_log_evidence
 from lab.diagnosis.fit import Fit, fit
-from lab.diagnosis.gain import errors_of, held_out_error, noise_floor, predictions_of
+from lab.diagnosis.gain import errors_of, held_out, held_out_error, noise_floor, predictions_of
 from lab.diagnosis.misfit import Misfit, Parameters
 from lab.diagnosis.noise import noise_of
 from lab.diagnosis.outcome import (
@@ -29,6 +29,7 @@ from lab.diagnosis.outcome import (
 )
 from lab.diagnosis.search import Candidate, search, wrong_parameters
 from lab.diagnosis.unlearnable import unlearnable
+from lab.diagnosis.starts import best_starts, free_decays, starts_of, with_starts
 from lab.diagnosis.whiteness import Whiteness, whiteness
 from lab.effects import EFFECTS
 from lab.effects.damping_change import DampingChange
@@ -93,25 +94,31 @@ def diagnose(
     Raises:
         LabError: recording and model do not fit together, or the recording has no measured input.
     """
+    if all(record.kind == "ambient" and not record.inputs.shape[0] for record in recording.records):
+        from lab.diagnosis.spectral.diagnose import diagnose_spectra
+
+        return diagnose_spectra(
+            recording, rig, baseline=baseline, widths=widths, effects=effects, progress=progress
+        )
     tell = progress or (lambda what: None)
     rig = nominal = _connected(rig, recording)
     model = twin(rig)
     parameters = parameters_of(model, widths)
     if baseline is not None:
         tell("calibrating on the baseline")
-        base = Misfit.of(_like(baseline, recording), model, parameters, share=1.0)
+        known_state = _like(baseline, recording)
+        base = Misfit.of(known_state, model, parameters, share=1.0)
+        base = with_starts(base, free_decays(known_state))
         known = calibrate(base, rig).fit
         # What the baseline taught becomes the model, and what it left open the prior.
         rig = calibrated_rig(base, known.theta, rig)
         model, parameters = twin(rig), _tightened(parameters, known)
-    misfit = Misfit.of(recording, model, parameters)
+    misfit = with_starts(Misfit.of(recording, model, parameters), free_decays(recording))
     tell("calibrating")
     calibration = calibrate(misfit, rig)
     found = calibration.fit
     state = State(calibration, found, (), found, (held_out_error(calibration.misfit, found),))
-    inputs = np.concatenate(
-        [u[:, :n] for (u, _), n in zip(misfit.records, misfit.n_train, strict=True)], axis=1
-    )
+    inputs = misfit.driven
     first: list[Candidate] = []
     left = whiteness(state.fit.residual, inputs)
     while len(state.accepted) < MOST_FINDINGS:
@@ -141,8 +148,14 @@ def evidence_threshold(looks: int) -> float:
 
 def _connected(rig: Rig, recording: Recording) -> Rig:
     """The rig with the recording's channels."""
-    if not recording.inputs or not all(record.inputs.shape[0] for record in recording.records):
-        raise LabError("a record has no measured input; a diagnosis needs records with measured forces")
+    blind = [
+        i for i, r in enumerate(recording.records) if not r.inputs.shape[0] and r.kind != "free_decay"
+    ]
+    if blind:
+        raise LabError(
+            f"record {blind[0]} has no measured input and is {recording.records[blind[0]].kind!r}; expected measured forces or "
+            "a free decay"
+        )
     return rig.connected(
         inputs=[channel.name for channel in recording.inputs],
         outputs=[channel.name for channel in recording.outputs],
@@ -164,7 +177,7 @@ def _like(baseline: Recording, recording: Recording) -> Recording:
 
 def _tightened(parameters: Parameters, known: Fit) -> Parameters:
     """The parameters with prior widths shrunk to what a baseline left open, never below a tenth of a percent."""
-    spread = np.sqrt(np.diag(known.covariance))[: parameters.n]
+    spread = np.sqrt(np.diag(known.covariance))[: parameters.n_factors]
     return replace(parameters, widths=np.maximum(parameters.widths * np.minimum(spread, 1.0), 1e-3))
 
 
@@ -293,9 +306,12 @@ def _outcome(
     for candidate, effect, _ in causes:
         if candidate.direction is None:
             extended = effect.apply(extended)
-    floor = noise_floor(state.fit.residual, state.misfit.measured)
-    accuracy = max(0.1 * floor, 1e-6)
-    predictions = predictions_of(recording, state.misfit, (nominal, calibrated, extended), accuracy=accuracy)
+    misfit = state.misfit
+    floor = noise_floor(state.fit.residual, held_out(misfit))
+    starts = [best_starts(misfit), starts_of(misfit, state.origin.theta), starts_of(misfit, state.fit.theta)]
+    predictions = predictions_of(
+        recording, misfit, (nominal, calibrated, extended), starts, accuracy=max(0.1 * floor, 1e-6)
+    )
     shares = _shares(state, floor)
     findings = [
         Finding(effect, quantities, 0.5 * candidate.gain, share, words.says(effect, quantities))
@@ -341,13 +357,13 @@ def _alternatives(first: Sequence[Candidate]) -> tuple[Alternative, ...]:
 
 def calibration_of(state: State) -> dict[str, Calibrated]:
     """Nominal and calibrated value of every parameter of the model, with the causes in it."""
-    misfit, n = state.misfit, state.fit.theta.size
+    misfit, n = state.misfit, state.misfit.parameters.n_factors
     model = misfit.twin
     nominal = np.concatenate([model.body_mass, model.stiffness, model.damping])
-    widths = misfit.parameters.widths
-    factors = np.exp(state.fit.theta * widths)
+    widths = misfit.parameters.widths[:n]
+    factors = np.exp(state.fit.theta[:n] * widths)
     stds = nominal * factors * widths * np.sqrt(np.diag(state.fit.covariance)[:n])
-    rows = zip(misfit.parameters.names, nominal, nominal * factors, stds, strict=True)
+    rows = zip(misfit.parameters.names[:n], nominal, nominal * factors, stds, strict=True)
     return {name: Calibrated(float(a), float(b), float(c)) for name, a, b, c in rows}
 
 

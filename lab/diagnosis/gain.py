@@ -10,6 +10,7 @@ from identification.recording import Array, Recording
 from lab.diagnosis.fit import Fit
 from lab.diagnosis.misfit import Misfit
 from lab.diagnosis.outcome import Errors, Prediction
+from lab.diagnosis.starts import start_of
 from lab.replay import replay
 from lab.rig import Rig
 
@@ -18,10 +19,27 @@ PAST = 30
 
 
 def predictions_of(
-    recording: Recording, misfit: Misfit, rigs: Sequence[Rig], *, accuracy: float
+    recording: Recording,
+    misfit: Misfit,
+    rigs: Sequence[Rig],
+    starts: Sequence[Sequence[Array | None]],
+    *,
+    accuracy: float,
 ) -> tuple[Prediction, ...]:
-    """Measured outputs and those of nominal, calibrated and extended rig, record by record."""
-    simulated = [replay(rig, recording, accuracy=accuracy) for rig in rigs]
+    """Measured outputs and those of nominal, calibrated and extended rig, record by record.
+
+    Args:
+        recording: what was measured.
+        misfit: of the nominal rig.
+        rigs: nominal, calibrated, extended.
+        starts: for each of them, the motion at the start of each record, as the nominal rig has it.
+        accuracy: of the simulation.
+    """
+    dofs = rigs[0].dofs
+    simulated = []
+    for rig, begins in zip(rigs, starts, strict=True):
+        motions = [None if start is None else start_of(rig, dofs, start) for start in begins]
+        simulated.append(replay(rig, recording, accuracy=accuracy, starts=motions))
     return tuple(
         Prediction(measured, nominal, calibrated, extended, first)
         for (_, measured), nominal, calibrated, extended, first in zip(
@@ -65,8 +83,13 @@ def held_out_error(misfit: Misfit, found: Fit) -> float:
     return relative_error(pairs)
 
 
+def held_out(misfit: Misfit) -> Array:
+    """Measured outputs that no fit has seen, of all records."""
+    return np.concatenate([y[:, n:] for (_, y), n in zip(misfit.records, misfit.n_train, strict=True)], axis=1)
+
+
 def noise_floor(residual: Array, measured: Array) -> float:
-    """Share of the signal that is noise: what of the residual cannot be predicted from its own past."""
+    """Share of a signal that is noise: what of a residual cannot be predicted from its own past."""
     shares = []
     for e, y in zip(residual, measured, strict=True):
         rows = np.lib.stride_tricks.sliding_window_view(e, PAST + 1)

@@ -9,12 +9,14 @@ from typing import Any
 
 import numpy as np
 
-from identification.recording import Array, Recording
+from identification.recording import Array, Record, Recording
 from lab.effects.effect import Effect
 from lab.effects.survey import Guess, Survey
 from lab.plant import NO_OBSERVER, Plant, ready
 from lab.twin import Twin
 
+ENERGY = 0.98
+"""Share of the energy of a free decay that fits may see: what follows is kept for the gain."""
 FARTHEST = 8.0
 """A positive variable stays within e⁸ of its scale either way: beyond, it means nothing and only overflows."""
 
@@ -167,8 +169,11 @@ class Misfit:
     @classmethod
     def of(cls, recording: Recording, twin: Twin, parameters: Parameters, *, share: float = 0.7) -> Misfit:
         """The misfit of a recording whose channels are those of the twin."""
-        records = tuple((np.asarray(r.inputs[:, :]), np.asarray(r.outputs[:, :])) for r in recording.records)
-        n_train = tuple(int(share * outputs.shape[1]) for _, outputs in records)
+        records = tuple((_inputs(r, len(recording.inputs)), np.asarray(r.outputs[:, :])) for r in recording.records)
+        n_train = tuple(
+            min(int(share * y.shape[1]), _decayed(y) if share < 1 and r.kind == "free_decay" else y.shape[1])
+            for r, (_, y) in zip(recording.records, records, strict=True)
+        )
         return cls(twin, parameters, records, recording.dt, n_train)
 
     @cached_property
@@ -176,6 +181,13 @@ class Misfit:
         """Training outputs of all records, one behind the other."""
         return np.concatenate(
             [y[:, :n] for (_, y), n in zip(self.records, self.n_train, strict=True)], axis=1
+        )
+
+    @cached_property
+    def driven(self) -> Array:
+        """Training inputs of all records, one behind the other."""
+        return np.concatenate(
+            [u[:, :n] for (u, _), n in zip(self.records, self.n_train, strict=True)], axis=1
         )
 
     def plant(self, theta: Array, causes: Sequence[Hypothesis] = ()) -> Plant:
@@ -208,6 +220,18 @@ class Misfit:
             )
             parts.append(np.where(np.isnan(y[:, :n]), 0.0, y[:, :n] - predicted))
         return np.concatenate(parts, axis=1)
+
+
+def _inputs(record: Record, n_inputs: int) -> Array:
+    """Measured forces of a record; none act where none were measured."""
+    measured = np.asarray(record.inputs[:, :])
+    return measured if measured.shape[0] else np.zeros((n_inputs, record.n_samples))
+
+
+def _decayed(outputs: Array) -> int:
+    """Samples after which little of a decay is left, yet enough to try a prediction on."""
+    power = np.nansum((outputs / np.maximum(np.nanstd(outputs, axis=1, keepdims=True), 1e-300)) ** 2, axis=0)
+    return int(np.searchsorted(np.cumsum(power), ENERGY * np.sum(power))) + 1
 
 
 def _widened(states: Array, plant: Plant, n: int, n_states: int) -> Array:
