@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import zipfile
+import zlib
 from collections.abc import Iterator, Mapping
 from pathlib import Path
 from typing import Any
@@ -22,12 +23,11 @@ def read_numpy(path: Path, part: ArraysPart) -> Source:
         FileError: not such a file, damaged, or an array of objects, which would run foreign code.
     """
     try:
-        with np.load(path, allow_pickle=False) as loaded:
-            variables = {name: loaded[name] for name in loaded.files}
-    except AttributeError:
-        # A bare array is no context.
-        variables = {"array": np.load(path, allow_pickle=False)}
-    except (OSError, ValueError, EOFError, zipfile.BadZipFile) as error:
+        with path.open("rb") as file:
+            loaded = np.load(file, allow_pickle=False)
+            bare = isinstance(loaded, np.ndarray)
+            variables = {"array": loaded} if bare else {name: loaded[name] for name in loaded.files}
+    except (OSError, ValueError, EOFError, zipfile.BadZipFile, zlib.error) as error:
         raise FileError(f"cannot be read as a NumPy file ({_short(error)})") from None
     return as_source(path, variables, part)
 

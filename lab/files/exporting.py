@@ -56,7 +56,7 @@ def export_file(
         recording: recording that says in which units the channels of a result measure.
         model: MJCF file that tells where the channels of a universal file are.
         points: TOML file that tells it.
-        text: signals of a universal file as text of 12 digits instead of binary numbers.
+        text: signals of a universal file as text of 13 digits instead of binary numbers.
 
     Raises:
         FileError: no such source, nothing of that kind in it, a format that cannot hold it.

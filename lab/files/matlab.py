@@ -37,7 +37,8 @@ def write_matlab(path: Path, variables: Mapping[str, Any]) -> None:
 
 def _version_5(path: Path) -> dict[str, Any]:
     try:
-        loaded = scipy.io.loadmat(path, simplify_cells=True)
+        with path.open("rb") as file:
+            loaded = scipy.io.loadmat(file, simplify_cells=True)
     except Exception as error:  # the reader of damaged files raises almost anything
         reason = " ".join(str(error).split()) or type(error).__name__
         raise FileError(f"cannot be read as a MATLAB file ({reason[:100]})") from None

@@ -19,6 +19,7 @@ DELIMITERS = {"tab": "\t", "semicolon": ";", "comma": ",", "space": None}
 """Name: what stands between columns; None for any run of blanks."""
 
 _NAMED_UNIT = re.compile(r"^(?P<name>.+?)\s*[\[(](?P<unit>[^\[\]()]+)[\])]$")
+_PLAIN = TablePart()
 _LOOK = 50
 """Lines in which the layout is looked for."""
 
@@ -74,10 +75,11 @@ def _lines(path: Path) -> list[str]:
     return lines
 
 
-def _fields(line: str, delimiter: str | None) -> list[str]:
+def _fields(line: str, delimiter: str | None, part: TablePart = _PLAIN) -> list[str]:
     fields = [field.strip().strip('"').strip() for field in line.strip("\r\n ").split(delimiter)]
     # Many loggers end every line with a delimiter.
-    return fields[:-1] if delimiter is not None and len(fields) > 1 and not fields[-1] else fields
+    ended = delimiter is not None and len(fields) > 1 and not fields[-1] and "" not in part.missing
+    return fields[:-1] if ended else fields
 
 
 def _is_number(text: str, part: TablePart) -> bool:
@@ -91,7 +93,7 @@ def _is_number(text: str, part: TablePart) -> bool:
 
 
 def _numeric(line: str, delimiter: str | None, part: TablePart) -> bool:
-    fields = _fields(line, delimiter)
+    fields = _fields(line, delimiter, part)
     return bool(fields) and all(_is_number(field, part) for field in fields)
 
 
@@ -121,11 +123,10 @@ def _delimiter(lines: Sequence[str], part: TablePart) -> str | None:
     """What stands between columns: stated, or the only one with which the first lines are numbers."""
     if part.delimiter:
         return DELIMITERS[part.delimiter]
-    fits = [
-        name
-        for name in DELIMITERS
-        if all(name in _fitting(line, part) for line in lines[:_LOOK] if line.strip())
-    ]
+    first = _fitting(lines[0], part)
+    looked = [line for line in lines[:_LOOK] if line.strip()]
+    # Where none fits all lines, the first tells the delimiter, and a later line is at fault.
+    fits = [name for name in first if all(_numeric(line, DELIMITERS[name], part) for line in looked)] or first
     widths = {name: len(_fields(lines[0], DELIMITERS[name])) for name in fits}
     # Blanks round a true delimiter, or a lone column, fit in several ways that mean the same.
     best = [name for name in fits if widths[name] == max(widths.values())]
@@ -150,7 +151,7 @@ def _numbers(lines: list[str], first: int, delimiter: str | None, part: TablePar
 
 def _cleaned(line: str, delimiter: str | None, part: TablePart) -> str:
     if part.missing or '"' in line:
-        fields = ["nan" if field in part.missing else field for field in _fields(line, delimiter)]
+        fields = ["nan" if field in part.missing else field for field in _fields(line, delimiter, part)]
         line = (delimiter or " ").join(fields)
     line = line.strip(" \r\n")
     if delimiter is not None and line.endswith(delimiter):

@@ -15,6 +15,7 @@ from lab.errors import FileError
 from lab.files.exporting_points import Points
 from lab.files.recording_geometry import Geometry
 from lab.files.uff import PROGRAM, RESPONSE, TIME
+from lab.files.uff_functions import function_bytes
 from lab.files.uff_units import TYPES
 
 FREQUENCY = 18
@@ -73,6 +74,8 @@ def signal_sets(recording: Recording, points: Points, *, binary: bool) -> list[S
             if not signals.shape[0]:
                 continue
             for row, channel in enumerate(channels):
+                if len(channel.name) > 80:
+                    raise FileError(f"channel name {channel.name!r} exceeds the 80 characters of an ID line")
                 signal = np.asarray(signals[row, :], dtype=np.float64)
                 if not np.isfinite(signal).all():
                     raise FileError(
@@ -176,22 +179,11 @@ def write_sets(sets: Sequence[Set], path: Path) -> None:
     path.write_bytes(b"")
     file = pyuff.UFF(str(path))
     for each in sets:
-        start = path.stat().st_size
-        # Overwriting would lose the header of a binary set, so every set is added to the empty file.
-        file.write_sets(dict(each), mode="add")
-        if each.get("binary"):
-            _mend_size(path, start, each)
-
-
-def _mend_size(path: Path, start: int, each: Set) -> None:
-    """Writes the number of data bytes anew: pyuff counts real numbers at even steps only."""
-    values = np.asarray(each["data"])
-    n = values.size * 8 * (2 if np.iscomplexobj(values) else 1)
-    n += 0 if each["abscissa_spacing"] else values.size * 8
-    # Behind "    -1\n    58b" and fields of 6, 6 and 12 characters.
-    with path.open("r+b") as file:
-        file.seek(start + 7 + 7 + 24)
-        file.write(b"%12d" % n)
+        if each["type"] == 58:
+            with path.open("ab") as end:
+                end.write(function_bytes(each))
+        else:
+            file.write_sets(dict(each), mode="add")
 
 
 def _function(
@@ -199,9 +191,9 @@ def _function(
 ) -> Set:
     steps = np.diff(axis)
     even = bool(np.allclose(steps, steps[0], rtol=1e-9, atol=0))
-    # Six digits of the step must not move the last line: uneven axes are written number by number.
+    # Seven digits of the step must not move the last line: uneven axes are written number by number.
     if kind == RESPONSE:
-        rounded = float(f"{axis[0]:.5e}") + float(f"{steps[0]:.5e}") * np.arange(axis.size)
+        rounded = float(f"{axis[0]:.6e}") + float(f"{steps[0]:.6e}") * np.arange(axis.size)
         even = even and bool(np.allclose(rounded, axis, rtol=1e-12, atol=0))
     return {
         "type": 58,
