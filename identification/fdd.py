@@ -19,7 +19,7 @@ from identification.errors import IdentificationError, OrderError
 from identification.modal_form import modal_outputs, modal_states
 from identification.modes import Modes
 from identification.recording import Array, Recording, frozen
-from identification.spectra import cross_spectra, unit_sizes
+from identification.spectra import CrossSpectra, cross_spectra, unit_sizes
 from identification.systems import Realization, StateSpace
 
 Complex = NDArray[np.complex128]
@@ -41,6 +41,7 @@ class FrequencyDomainDecomposition:
         modes: frequency and damping from the correlation of each bell (EFDD), sorted by frequency, as are
             the bells.
         n_averages: independent pieces behind each line.
+        n_segment: samples of a piece.
         notes: what was chosen and why, one sentence each.
     """
 
@@ -50,6 +51,7 @@ class FrequencyDomainDecomposition:
     peak_hz: Array
     modes: Modes
     n_averages: float
+    n_segment: int
     notes: tuple[str, ...] = ()
 
     def __post_init__(self) -> None:
@@ -89,8 +91,22 @@ def fdd(
     Source: Brincker, Zhang and Andersen (2001), Smart Mater. Struct. 10, 441-445 (FDD); Brincker, Ventura
         and Andersen (2001), Proc. 19th IMAC (enhanced FDD).
     """
-    spectra = cross_spectra(recording, n_segment=n_segment, zero_padding=2)
-    size = unit_sizes(np.einsum("foo->o", spectra.values).real, recording.outputs)
+    return decomposition(cross_spectra(recording, n_segment=n_segment, zero_padding=2), min_mac=min_mac)
+
+
+def decomposition(spectra: CrossSpectra, *, min_mac: float = 0.8) -> FrequencyDomainDecomposition:
+    """Modes from spectra that are there already.
+
+    Args:
+        spectra: of twice as many lines as the pieces have, `zero_padding` 2.
+        min_mac: as for `fdd`.
+
+    Returns:
+        As for `fdd`.
+
+    Source: as for `fdd`.
+    """
+    size = unit_sizes(np.einsum("foo->o", spectra.values).real, spectra.outputs)
     power, vectors = np.linalg.eigh(spectra.values / size[:, None] / size)
     S, U = np.maximum(power[:, ::-1], 0), vectors[:, :, ::-1]
     segments, n = spectra.segments, spectra.segments.n_averages
@@ -99,7 +115,7 @@ def fdd(
     factor = float(share / (1 - share))  # of two spectra with 2n degrees of freedom each: the F distribution
     bells = find_bells(S, U, factor=factor, min_mac=min_mac)
     window = spectra.lag_window()
-    poles = np.array([bell_pole(bell, 2 * segments.length, recording.dt, window) for bell in bells], complex)
+    poles = np.array([bell_pole(bell, 2 * segments.length, spectra.dt, window) for bell in bells], complex)
     shapes = size[:, None] * np.array([bell.shape for bell in bells], complex).reshape(-1, size.size).T
     peaks = spectra.frequency_hz[[bell.peak for bell in bells]]
     rank = np.argsort(np.abs(poles), kind="stable")
@@ -109,8 +125,9 @@ def fdd(
         S,
         tuple(bells[k] for k in rank),
         peaks[rank],
-        Modes.from_poles(poles, shapes, recording.outputs),
+        Modes.from_poles(poles, shapes, spectra.outputs),
         n,
+        segments.length,
         (*segments.notes, note),
     )
 
@@ -158,7 +175,11 @@ def efdd(
     by_prominence = np.argsort([-bell.prominence for bell in found.bells], kind="stable")
     systems = tuple(_model(found.modes.take(np.sort(by_prominence[: n // 2])), recording.dt) for n in wanted)
     peaks = np.sort([float(np.max(bell.power)) for bell in found.bells])[::-1]
-    settings: dict[str, int | float | str] = {"min_mac": min_mac, "n_averages": found.n_averages}
+    settings: dict[str, int | float | str] = {
+        "min_mac": min_mac,
+        "n_averages": found.n_averages,
+        "n_segment": found.n_segment,
+    }
     return Realization("efdd", systems, peaks, order or wanted[-1], settings, found.notes)
 
 

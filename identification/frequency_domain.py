@@ -102,7 +102,10 @@ def plscf_recording(
     systems = tuple(
         replace(system, B=system.B[:, :0], D=system.D[:, :0], inputs=()) for system in found.systems
     )
-    settings["n_references"] = len(response.inputs)
+    settings |= {
+        "n_references": len(response.inputs),
+        "n_lags": round(1 / (response.frequency_hz[1] * recording.dt)),
+    }
     return replace(found, systems=systems, settings=settings, notes=(*notes, *found.notes))
 
 

@@ -9,14 +9,16 @@ from typing import Any
 import numpy as np
 
 from identification.clusters import Poles, Thresholds, difference
-from identification.errors import IdentificationError, NotSecondOrderError
-from identification.layout import layout
+from identification.errors import IdentificationError, RecordingError
+from identification.explanation import explanation
+from identification.found import Found, matrices_of
 from identification.methods import find_method
 from identification.modes import Modes
 from identification.output_only import horizon_warning
 from identification.recording import Recording
-from identification.second_order import second_order
+from identification.refinement import Refinement, refinement
 from identification.settled import NESTED, settle
+from identification.spectral_scatter import SPECTRAL, spectral_std, with_std
 from identification.stability import Stabilization, stabilize
 from identification.systems import Realization, SecondOrder
 from identification.uncertainty import Placed, matrices_with_error_bars, modes_with_error_bars
@@ -35,6 +37,8 @@ class Identification:
         second_order: M, C_d and K, or None where the channels or the data do not determine them.
         notes: what was chosen and why, one sentence each.
         warnings: what a careful reader should know, one sentence each.
+        explanation: one paragraph on the method, order and horizon chosen, and on what was kept and rejected.
+        refinement: the maximum of the likelihood that modes and matrices were moved to; None where not asked for.
     """
 
     realization: Realization
@@ -44,6 +48,8 @@ class Identification:
     second_order: SecondOrder | None
     notes: tuple[str, ...]
     warnings: tuple[str, ...]
+    explanation: str = ""
+    refinement: Refinement | None = None
 
 
 def identify(
@@ -53,6 +59,7 @@ def identify(
     order: int | None = None,
     dofs: Sequence[str] | None = None,
     uncertainty: bool = True,
+    refine: bool = False,
     **settings: Any,
 ) -> Identification:
     """Modes of the structure behind a recording, and M, C and K where its channels allow.
@@ -65,11 +72,18 @@ def identify(
         dofs: names of the degrees of freedom of M, C and K in the order wanted.
         uncertainty: whether to find the standard deviations of modes and matrices too, which costs about as much
             again as the estimates.
+        refine: whether to move modes and matrices to the maximum of the likelihood, whatever method they come from;
+            only with measured forces, or free decays. Their standard deviations are then those of the likelihood.
         **settings: further settings of the method.
 
+    Returns:
+        Modes and matrices with standard deviations, the models behind them, and the reasons for every choice.
+
     Raises:
-        RecordingError: a sample is missing; tells the channel and the time.
+        RecordingError: a sample is missing, or forces that `refine` needs; tells the channel or record.
         IdentificationError: no such method or setting, or data that the method cannot use.
+
+    Source: that of the method (`METHODS`); for M, C_d and K De Angelis et al. (2002), J. Appl. Mech. 69, eq. (18).
     """
     recording.require_complete()
     name, reason = (method, "as asked for") if method is not None else choose_method(recording)
@@ -91,17 +105,35 @@ def identify(
         stable = (True,) * len(modes)
         realization, note = _lowest_complete(realization, stabilization)
         notes += note
-    matrices, verdict = _matrices(realization, dofs)
-    if uncertainty:
-        modes, matrices, missing = _error_bars(recording, realization, modes, matrices, places, settings)
-        notes += missing
+    found = Found(recording, realization, stabilization, modes, places, settings)
+    matrices, source, verdict = matrices_of(found, dofs)
+    refined, after, doubts = _refined(found, matrices) if refine else (None, (), ())
+    if refined is not None:
+        modes, matrices = refined.modes, refined.second_order
+        stable = tuple(stable[k] for k in refined.partners)
+    elif uncertainty:
+        modes, matrices, missing = _error_bars(found, matrices, source)
+        after += missing
     warnings = (
         *_order_warnings(realization, modes),
         *(horizon_warning(modes, realization) if name == "ssi_cov" else ()),
-        *_length_warnings(recording, realization, modes),
+        *(() if refined else _length_warnings(recording, realization, modes)),
+        *doubts,
     )
-    notes = tuple(note for note in (*notes, *verdict) if note not in warnings)
-    return Identification(realization, stabilization, modes, stable, matrices, notes, warnings)
+    before, after = (
+        tuple(note for note in each if note not in warnings) for each in (notes, (*verdict, *after))
+    )
+    return Identification(
+        realization,
+        stabilization,
+        modes,
+        stable,
+        matrices,
+        (*before, *after),
+        warnings,
+        explanation(before, stabilization, stable, after),
+        refined,
+    )
 
 
 def choose_method(recording: Recording) -> tuple[str, str]:
@@ -141,20 +173,6 @@ def _lowest_complete(
     )
 
 
-def _matrices(
-    realization: Realization, dofs: Sequence[str] | None
-) -> tuple[SecondOrder | None, tuple[str, ...]]:
-    """M, C_d and K of the model with two states per degree of freedom, or why there are none."""
-    system = realization.system
-    try:
-        n_states = 2 * len(layout(system.outputs, system.inputs, dofs=dofs).dofs)
-        if n_states in realization.orders:
-            system = realization.at(n_states)
-        return second_order(system, dofs=dofs), ()
-    except NotSecondOrderError as error:
-        return None, (f"Mass, damping and stiffness are left out: {error}.",)
-
-
 def first_settled(stabilization: Stabilization) -> list[Placed]:
     """Where each mode stands at the lowest order at which it has settled.
 
@@ -170,27 +188,65 @@ def first_settled(stabilization: Stabilization) -> list[Placed]:
     return places
 
 
+def _refined(
+    found: Found, matrices: SecondOrder | None
+) -> tuple[Refinement | None, tuple[str, ...], tuple[str, ...]]:
+    """The maximum of the likelihood with the sentence on it and its warnings, or the reason why there is none."""
+    try:
+        refined = refinement(found.recording, found.modes, system=found.own_model(), matrices=matrices)
+    except RecordingError:  # what was asked for cannot be had from these records
+        raise
+    except IdentificationError as error:
+        return None, (), (f"Nothing was refined: {error}.",)
+    return refined, (refined.sentence,), refined.warnings
+
+
 def _error_bars(
-    recording: Recording,
-    realization: Realization,
-    modes: Modes,
-    matrices: SecondOrder | None,
-    places: list[Placed] | None,
-    settings: dict[str, Any],
+    found: Found, matrices: SecondOrder | None, source: Found | None
 ) -> tuple[Modes, SecondOrder | None, tuple[str, ...]]:
     """Modes and matrices with their standard deviations, or the reasons why they have none."""
-    notes = []
+    modes, notes = found.modes, []
     try:
-        modes = modes_with_error_bars(recording, realization, modes, places=places, settings=settings)
+        modes, matrices = _bars_of_modes(found, matrices if source is found else None, matrices)
     except IdentificationError as error:
         notes.append(f"The modes have no error bars: {error}.")
-    if matrices is not None:
+    if matrices is not None and matrices.mass_std is None:
         try:
-            order = 2 * len(matrices.dofs)
-            matrices = matrices_with_error_bars(recording, realization, matrices, order)
+            matrices = _bars_of_matrices(found, matrices, source)
         except IdentificationError as error:
             notes.append(f"Mass, damping and stiffness have no error bars: {error}.")
     return modes, matrices, tuple(notes)
+
+
+def _bars_of_modes(
+    found: Found, own: SecondOrder | None, matrices: SecondOrder | None
+) -> tuple[Modes, SecondOrder | None]:
+    """Modes with error bars, and the matrices that follow from them, `own`, as well where that costs nothing more."""
+    if found.realization.method not in SPECTRAL:
+        modes = modes_with_error_bars(
+            found.recording, found.realization, found.modes, places=found.places, settings=found.settings
+        )
+        return modes, matrices
+    if not len(found.modes):
+        return found.modes, matrices
+    std = spectral_std(
+        found.recording,
+        found.realization,
+        found.tracks(),
+        dofs=None if own is None else own.dofs,
+        settings=found.settings,
+    )
+    return with_std(found.modes, matrices, std)
+
+
+def _bars_of_matrices(found: Found, matrices: SecondOrder, source: Found | None) -> SecondOrder:
+    """Matrices of a model with inputs, or of modes (`source`) to which the inputs were fitted."""
+    if source is None:
+        return matrices_with_error_bars(found.recording, found.realization, matrices, 2 * len(matrices.dofs))
+    std = spectral_std(
+        source.recording, source.realization, source.tracks(), dofs=matrices.dofs, settings=source.settings
+    )
+    return with_std(source.modes, matrices, std)[1] or matrices
 
 
 def _order_warnings(realization: Realization, modes: Modes) -> tuple[str, ...]:

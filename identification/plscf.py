@@ -81,6 +81,7 @@ def plscf(
     if not asked and band is None and (rank := _rank(R, n_inputs)):
         asked, order = [rank], rank
         notes = (f"Order {rank} is the rank of the equations, whose singular values end in rounding errors.",)
+    settings["poles"] = "all" if order is None else "strongest"
     if order is None:
         degrees = _degrees(asked, n_inputs, p)
         fits = [_fit(response, circle, *zeros(coefficients(R, n_inputs, q))) for q in degrees]

@@ -45,7 +45,20 @@ def jackknife_std(
         raise TooShortError(
             f"{recording.n_samples} samples cannot be cut into {n_parts} parts; record for longer"
         )
-    values = np.stack([estimate(without_part(recording, part, n_parts)) for part in range(n_parts)])
+    return spread_of_parts(
+        np.stack([estimate(without_part(recording, part, n_parts)) for part in range(n_parts)])
+    )
+
+
+def spread_of_parts(values: Array) -> Array:
+    """One standard deviation from estimates that lack one of several equal parts each, shape (n_values,).
+
+    Args:
+        values: shape (n_parts, n_values); NaN where an estimate could not be had, which makes it infinite.
+
+    Source: Künsch (1989), Ann. Stat. 17(3), eq. (2.3).
+    """
+    n_parts = len(values)
     lost = ~np.all(np.isfinite(values), axis=0)
     spread = np.where(lost, 0.0, values)
     variance = (n_parts - 1) / n_parts * np.sum((spread - spread.mean(axis=0)) ** 2, axis=0)

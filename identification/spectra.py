@@ -58,7 +58,11 @@ class CrossSpectra:
 
 
 def cross_spectra(
-    recording: Recording, *, n_segment: int | None = None, zero_padding: int = 1
+    recording: Recording,
+    *,
+    n_segment: int | None = None,
+    zero_padding: int = 1,
+    segments: Segments | None = None,
 ) -> CrossSpectra:
     """Cross-spectra of all outputs with one another, from half-overlapping pieces under a Hann window.
 
@@ -67,14 +71,18 @@ def cross_spectra(
         n_segment: samples of a piece; chosen for about 32 averages when None.
         zero_padding: length of the transforms over that of the pieces. With 2, the inverse transform of a
             spectrum is the correlation of the pieces, not wrapped around.
+        segments: the pieces themselves, in place of `n_segment`.
+
+    Returns:
+        One-sided densities at all lines.
 
     Raises:
         RecordingError: a sample is missing.
         TooShortError: no record is as long as `n_segment`.
 
-    Source: Welch (1967), IEEE Trans. Audio Electroacoust. 15(2).
+    Source: Welch (1967), IEEE Trans. Audio Electroacoust. 15(2), 70-73, eq. (5) and (6).
     """
-    segments = hann_segments(recording, n_segment, n_averages=32)
+    segments = segments or hann_segments(recording, n_segment, n_averages=32)
     n = zero_padding * segments.length
     total = np.zeros((n // 2 + 1, len(recording.outputs), len(recording.outputs)), complex)
     with np.errstate(invalid="ignore", over="ignore"):  # told by name just below

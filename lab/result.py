@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
+from identification.likelihood import Estimate
 from identification.modes import Modes
 from identification.stability import Stabilization
 from identification.systems import Realization, SecondOrder
@@ -45,6 +46,8 @@ class Result:
         criteria: requirements of the scenario.
         warnings: what a careful reader should know, one sentence each.
         notes: what the method chose by itself and why, one sentence each.
+        explanation: one paragraph on method, order and horizon, modes kept and poles rejected.
+        refinement: the maximum of the likelihood that modes and matrices were moved to, or None.
     """
 
     title: str
@@ -60,3 +63,5 @@ class Result:
     criteria: tuple[Criterion, ...] = ()
     warnings: tuple[str, ...] = ()
     notes: tuple[str, ...] = ()
+    explanation: str = ""
+    refinement: Estimate | None = None

@@ -71,6 +71,7 @@ def identify_file(
     *,
     method: str | None = None,
     order: int | None = None,
+    refine: bool = False,
     force: bool = False,
     command: str = "",
     **settings: Any,
@@ -82,6 +83,7 @@ def identify_file(
         out: folder to come, with result.json, report.html and run.rrd.
         method: name, as in `lab list methods`; chosen from the data when None.
         order: number of states; chosen from the data when None.
+        refine: move modes and matrices to the maximum of the likelihood; needs measured forces, or free decays.
         force: replace an earlier output there.
         command: how the lab was called, for the report.
         settings: further settings of the method.
@@ -91,7 +93,7 @@ def identify_file(
     """
     with output_folder(out, force=force) as folder:
         recording = load(path)
-        result = examine(recording, method, order=order, **settings)
+        result = examine(recording, method, order=order, refine=refine, **settings)
         present(folder, result, recording, command=command)
     return result
 
@@ -138,6 +140,7 @@ def examine(
     *,
     order: int | None = None,
     dofs: Sequence[str] | None = None,
+    refine: bool = False,
     **settings: Any,
 ) -> Result:
     """The result of identifying a recording, without any truth beside it.
@@ -147,12 +150,13 @@ def examine(
         method: name, as in `lab list methods`; chosen from the data when None.
         order: number of states; chosen from the data when None.
         dofs: names of the degrees of freedom of M, C, K, in the order wanted.
+        refine: move modes and matrices to the maximum of the likelihood; needs measured forces, or free decays.
         settings: further settings of the method.
 
     Raises:
         IdentificationError: the recording or the request is at fault.
     """
-    found = identify(recording, method, order=order, dofs=dofs, **settings)
+    found = identify(recording, method, order=order, dofs=dofs, refine=refine, **settings)
     return Result(
         title=recording.title,
         sample_rate=recording.sample_rate,
@@ -163,6 +167,8 @@ def examine(
         stabilization=found.stabilization,
         warnings=tuple(found.warnings),
         notes=tuple(found.notes),
+        explanation=found.explanation,
+        refinement=None if found.refinement is None else found.refinement.estimate,
     )
 
 

@@ -20,7 +20,7 @@ WIDTH = 100
 def summary(result: Result) -> str:
     """Matrices with their errors, modes beside the true ones, criteria and warnings, as lines of text."""
     parts = [_headline(result), _matrices(result), _modes(result), _criteria(result)]
-    parts += [textwrap.fill(" ".join(result.notes), WIDTH)]
+    parts += [textwrap.fill(result.explanation or " ".join(result.notes), WIDTH)]
     parts += ["\n".join(textwrap.fill(f"warning: {each}", WIDTH) for each in result.warnings)]
     return "\n\n".join(part for part in parts if part)
 

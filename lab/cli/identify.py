@@ -15,6 +15,12 @@ from lab.cli.shared import example, method_options, output_options, tell, typed
 @click.argument("recording", metavar="RECORDING.h5", type=click.Path(path_type=Path))
 @output_options
 @method_options
+@click.option(
+    "--refine",
+    is_flag=True,
+    help="Move modes, and M, C, K where the set-up allows, to the maximum of the likelihood, with its error bars; "
+    "needs measured forces, or free decays.",
+)
 def command(
     recording: Path,
     out: Path | None,
@@ -23,10 +29,13 @@ def command(
     quiet: bool,
     method: str | None,
     order: int | None,
+    refine: bool,
 ) -> None:
     """Modes, and M, C, K where the set-up allows, of any recording, real or virtual."""
     from lab.run import identify_file
 
     folder = out or Path("out") / f"{recording.resolve().parent.name}_{recording.stem}"
-    result = identify_file(recording, folder, method=method, order=order, force=force, command=typed())
+    result = identify_file(
+        recording, folder, method=method, order=order, refine=refine, force=force, command=typed()
+    )
     tell(result, folder, as_json, quiet)

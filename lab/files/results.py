@@ -12,6 +12,7 @@ from typing import Any
 
 import numpy as np
 
+from identification.likelihood import Estimate
 from identification.modes import Modes
 from identification.recording import Array
 from identification.systems import SecondOrder
@@ -48,6 +49,8 @@ def result_document(result: Result) -> dict[str, Any]:
         "criteria": [asdict(criterion) for criterion in result.criteria],
         "warnings": list(result.warnings),
         "notes": list(result.notes),
+        "explanation": result.explanation,
+        "refinement": _refinement(result.refinement),
     }
     return dict(_plain(document))
 
@@ -116,6 +119,21 @@ def _second_order(matrices: SecondOrder | None) -> dict[str, Any] | None:
         return None
     names = ("mass", "damping", "stiffness", "mass_std", "damping_std", "stiffness_std")
     return {"dofs": list(matrices.dofs)} | {name: _rows(getattr(matrices, name)) for name in names}
+
+
+def _refinement(estimate: Estimate | None) -> dict[str, Any] | None:
+    """How the maximum of the likelihood was reached, and the noise found at it, by output channel."""
+    if estimate is None:
+        return None
+    outputs = [channel.name for channel in estimate.modes.outputs]
+    return {
+        "parameters": len(estimate.names),
+        "log_likelihood": estimate.log_likelihood,
+        "iterations": estimate.n_iterations,
+        "converged": estimate.converged,
+        "noise_std": dict(zip(outputs, estimate.noise_std.T.tolist(), strict=True)),
+        "whiteness": dict(zip(outputs, estimate.whiteness.tolist(), strict=True)),
+    }
 
 
 def _rows(matrix: Array | None) -> list[list[float]] | None:

@@ -52,7 +52,7 @@ def write_diagnosis_report(
         errors=error_table(diagnosis),
         calibration=calibration_table(diagnosis),
         figures=[inline(drawing) for drawing in draw_diagnosis(diagnosis, recording)],
-        notes=(),
+        explanation="",
         warnings=diagnosis.warnings,
         unlearnable=diagnosis.unlearnable,
         noise=noise_table(diagnosis),

@@ -47,7 +47,7 @@ def write_report(
         modes=modes_table(result),
         **_matrices(result),
         figures=[inline(drawing) for drawing in draw(result, recording)],
-        notes=result.notes,
+        explanation=result.explanation or " ".join(result.notes),
         warnings=result.warnings,
         command=command,
         scenario_text=scenario_text,
