@@ -23,7 +23,7 @@ def starting_recipe(source: Source) -> str:
         f"# {source.path.name} shows:",
         *shown,
         "#",
-        f'# Replace every "{OPEN}", then: lab import … --recipe',
+        f"# Replace every {OPEN} by what is known, then: lab import FILE --recipe RECIPE.toml",
     ]
     names = list(source.columns)
     frequency = next((name for name in names if name.lower().startswith("freq")), None)
