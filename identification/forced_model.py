@@ -7,7 +7,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from identification.errors import IdentificationError
+from identification.errors import IdentificationError, RecordingError
 from identification.modal_parameters import modal_parameters
 from identification.modes import Modes
 from identification.output_error import output_error, simulated
@@ -53,6 +53,10 @@ def forced_model(recording: Recording, modes: Modes, *, likeliest: bool = False)
     """
     if not len(modes):
         raise IdentificationError("there is no mode to fit the inputs to; record for longer")
+    if not recording.inputs or not all(record.inputs.shape[0] for record in recording.records):
+        raise RecordingError(
+            "a record has no measured inputs to fit to the modes; expected forces in every record"
+        )
     family = modal_parameters(modes, inputs=recording.inputs, dt=recording.dt)
     at_rest = all(record.kind in FROM_REST for record in recording.records)
     theta = family.values

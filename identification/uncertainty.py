@@ -3,6 +3,7 @@
 - `era`: the residual's noise, to first order through the Hankel matrix (`pulse_scatter`).
 - `okid_era`: the residual's noise through the observer's regression (`observer_scatter`).
 - `ssi_cov`, `ssi_data`, `next_era`: the record's own randomness, as the mean of a series in time (`covariance_scatter`).
+- `plscf` and `efdd`: the noise redrawn, or pieces left out (`spectral_scatter`).
 - any other method on stationary records: parts left out in turn (`resampling`).
 
 Over repeated tests the truth lies within ±2 of them about 95 % of the time, as long as the method itself has no
@@ -31,6 +32,7 @@ from identification.recording import Array, Recording
 from identification.resampling import jackknife_std
 from identification.second_order import second_order
 from identification.settled import NESTED
+from identification.spectral_scatter import SPECTRAL, Tracks, spectral_std
 from identification.systems import Realization, SecondOrder
 
 STEP = 1e-6
@@ -79,6 +81,8 @@ def modes_with_error_bars(
         std = covariance_scatter(recording, realization, places, references=given.get("references"))
     elif realization.method in ("era", "okid_era"):
         std = _from_tangents(recording, realization, places)
+    elif realization.method in SPECTRAL:
+        std = spectral_std(recording, realization, Tracks.of_places(places), settings=given)[:2]
     else:
         std = _from_parts(recording, realization, places, given)
     return replace(modes, frequency_std=std[0], damping_std=std[1])

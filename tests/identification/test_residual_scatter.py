@@ -1,0 +1,59 @@
+"""Error bars from redrawn noise against the variance of a linear estimate, which is known."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from identification.errors import TooShortError
+from identification.recording import Record
+from identification.residual_scatter import DRAWS, residual_std
+from tests.systems import paper_chain3, recorded
+
+
+def test_a_linear_estimate_scatters_as_its_weights_say():
+    rng = np.random.default_rng(0)
+    recording = recorded(paper_chain3(), [rng.standard_normal((2, 400))])
+    noise = 0.1 * rng.standard_normal((2, 400))
+    noisy = replace(
+        recording, records=(replace(recording.records[0], outputs=recording.records[0].outputs + noise),)
+    )
+    weights = rng.standard_normal((30, 2, 400))
+    std = residual_std(noisy, [noise], lambda r: np.tensordot(weights, r.records[0].outputs, 2))
+    expected = 0.1 * np.linalg.norm(weights.reshape(30, -1), axis=1)
+    # Each is good to 1/√(2 · 23); thirty together are five times better.
+    assert np.sqrt(np.mean((std / expected) ** 2)) == pytest.approx(1, abs=4 / np.sqrt(2 * (DRAWS - 1) * 30))
+
+
+def test_coloured_noise_keeps_its_colour_and_its_share_at_each_output():
+    rng = np.random.default_rng(1)
+    white = rng.standard_normal(1001)
+    slow = np.convolve(white, np.ones(20) / np.sqrt(20), mode="valid")[:982]
+    noise = np.stack([slow, slow])
+    record = Record("random", np.zeros((2, 982)), noise)
+    recording = replace(recorded(paper_chain3(), [np.zeros((2, 4))]), records=(record,))
+
+    def estimate(part):
+        y = part.records[0].outputs
+        return np.array([np.mean(y[0]), y[0, 500] - y[1, 500]])
+
+    std = residual_std(recording, [noise], estimate)
+    # A mean of slow noise scatters by √20 more than one of white noise (its line at zero is drawn by sign alone).
+    assert std[0] == pytest.approx(abs(np.mean(slow)), rel=0.2)
+    assert std[1] < 1e-12
+
+
+def test_what_often_fails_has_no_finite_error_bar_and_short_records_none():
+    record = Record("random", np.zeros((2, 50)), np.ones((2, 50)))
+    recording = replace(recorded(paper_chain3(), [np.zeros((2, 4))]), records=(record,))
+    rng = np.random.default_rng(2)
+    noise = rng.standard_normal((2, 50))
+
+    def fails(part):
+        return np.array([np.nan if part.records[0].outputs[0, 3] > 1 else 1.0, 2.0])
+
+    std = residual_std(recording, [noise], fails)
+    assert std[0] == np.inf
+    assert std[1] == 0
+    with pytest.raises(TooShortError, match="beyond 100 unknowns"):
+        residual_std(recording, [noise], fails, n_unknowns=100)
