@@ -111,6 +111,8 @@ CASES = {
         random_forces, CHAIN3, {"method": "okid_era", "order": 6, "dofs": chain3().dofs}, chain3()
     ),
     "chain7 ambient ssi_cov": Case(wind, CHAIN7, {"method": "ssi_cov"}),
+    "chain7 ambient ssi_data": Case(wind, CHAIN7, {"method": "ssi_data"}),
+    "chain7 ambient next_era": Case(wind, CHAIN7, {"method": "next_era"}),
 }
 
 

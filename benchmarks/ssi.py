@@ -38,6 +38,13 @@ def chain_modes(n_masses: int):
     return scipy.linalg.eigh(shape)
 
 
+def measured_masses(n_masses: int, channels: int):
+    """Masses with an accelerometer, evenly spread, shape (channels,)."""
+    import numpy as np
+
+    return np.linspace(n_masses // channels, n_masses, channels, dtype=int) - 1
+
+
 def chain_response(n_masses: int, n_samples: int, channels: int, *, seed: int = 0):
     """Accelerations of a chain of unit masses under white forces on all, at evenly spread masses."""
     import numpy as np
@@ -46,7 +53,7 @@ def chain_response(n_masses: int, n_samples: int, channels: int, *, seed: int = 
 
     value, vector = chain_modes(n_masses)
     rng = np.random.default_rng(seed)
-    rows = np.linspace(n_masses // channels, n_masses, channels, dtype=int) - 1
+    rows = measured_masses(n_masses, channels)
     response = np.zeros((channels, n_samples))
     for k in range(n_masses):
         # One mode at a time: q̈ + 2.5 v q̇ + 2500 v q = p, sampled with p held for 0.027 s.

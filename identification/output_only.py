@@ -113,20 +113,52 @@ def realized(
         OrderError: an order exceeds the rank of H.
     """
     U, singular_values = leading_subspace(H, plan.orders[-1] + 2)
-    rank = int(np.sum(singular_values > np.finfo(float).eps * max(H.shape) * singular_values[0]))
+    wanted = orders_within_rank(plan, singular_values, H.shape)
+    systems = shift_invariance(U, singular_values, n_outputs=len(scale), orders=wanted)
+    return gathered(method, recording, order, plan, singular_values, [(A, C * scale) for A, C in systems])
+
+
+def past_and_future(R: Array, plan: Plan) -> Array:
+    """Covariances below each other, from every lag of the past on, (n_rows * n_outputs, n_columns * n_references).
+
+    Args:
+        R: covariances from the first lag wanted on, shape (n_lags, n_outputs, n_references).
+        plan: the horizon.
+
+    Source: Cambraia and Kurka (2010), VI CONEM, eq. (29), with the block columns in reverse order.
+    """
+    return np.hstack([R[lag : lag + plan.n_rows].reshape(-1, R.shape[2]) for lag in plan.past])
+
+
+def orders_within_rank(plan: Plan, singular_values: Array, shape: tuple[int, ...]) -> list[int]:
+    """The orders of the plan that the data carry; the caller's own ones must be among them.
+
+    Raises:
+        OrderError: an order exceeds the numerical rank.
+    """
+    rank = int(np.sum(singular_values > np.finfo(float).eps * max(shape) * singular_values[0]))
     wanted = [n for n in plan.orders if n <= rank] if plan.swept else plan.orders
     if not wanted or wanted[-1] > rank:
         raise OrderError(
             f"order {plan.orders[-1]} exceeds {rank}, the numerical rank of the outputs; "
             "lower the order, or check the channels where the rank is zero"
         )
-    systems = tuple(
-        _outputs_only(A, C * scale, recording)
-        for A, C in shift_invariance(U, singular_values, n_outputs=len(scale), orders=wanted)
-    )
+    return wanted
+
+
+def gathered(
+    method: str,
+    recording: Recording,
+    order: int | None,
+    plan: Plan,
+    singular_values: Array,
+    models: Sequence[tuple[Array, Array]],
+) -> Realization:
+    """The realization made of A and C of every order, with the order chosen where the caller left it open."""
+    systems = tuple(_outputs_only(A, C, recording) for A, C in models)
     notes = plan.notes
     if order is None:
-        order = _largest_gap(singular_values, wanted)
+        order = _largest_gap(singular_values, [system.n_states for system in systems])
         notes += (f"The singular values drop most steeply after the first {order}.",)
     found = Realization(method, systems, singular_values, order, plan.settings(), notes)
     return replace(found, notes=(*notes, *horizon_warning(found.system.modes(), found)))

@@ -45,9 +45,13 @@ def settle(stabilization: Stabilization) -> Settled:
     noise splits a mode in two, does not raise the order for all others.
 
     Args:
-        stabilization: at least one mode.
+        stabilization: of models of one of the methods `NESTED`, with at least one mode.
 
-    Source: the order as in Peeters and De Roeck (1999), Mech. Syst. Signal Process. 13(6), section 4.
+    Returns:
+        The modes with the order and the pole that each was taken from.
+
+    Source: the order at which a diagram has stabilized, as in Peeters and De Roeck (1999), Mech. Syst. Signal
+        Process. 13(6), section 4.
     """
     length = np.bincount(stabilization.cluster[stabilization.cluster >= 0])
     first = [int(np.flatnonzero(stabilization.cluster == k)[0]) for k in range(length.size)]

@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from identification.covariance import output_covariances, reference_rows
-from identification.output_only import plan_hankel, realized
+from identification.output_only import past_and_future, plan_hankel, realized
 from identification.recording import Array, Recording
 from identification.systems import Realization
 
@@ -52,7 +52,7 @@ def ssi_cov(
     plan = plan_hankel(recording, order, orders, n_rows, rows.size)
     R = output_covariances(recording, plan.n_rows + plan.past[-1], references=references)
     scale = balance(R, recording, rows)
-    H = np.hstack([R[lag : lag + plan.n_rows].reshape(-1, rows.size) for lag in plan.past])
+    H = past_and_future(R, plan)
     del R
     return realized("ssi_cov", recording, order, plan, H, scale)
 
