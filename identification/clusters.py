@@ -124,6 +124,9 @@ def join(poles: Poles, chain: Indices, limits: Thresholds) -> Indices:
         poles: all poles.
         chain: number of each pole's chain, -1 for none.
         limits: as for one order to the next.
+
+    Returns:
+        Shape (n_poles,).
     """
     mean = cluster_means(poles, chain)
     n = mean.frequency_hz.size

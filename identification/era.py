@@ -123,7 +123,9 @@ def era_dc(
         OrderError: an order exceeds the numerical rank.
         TooShortError: too few lags.
 
-    Source: Juang, Cooper and Wright (1988), Control Theory Adv. Technol. 4(1), 5-14.
+    Source: Juang, Cooper and Wright (1988), Control Theory Adv. Technol. 4(1), 5-14: with U(k) the block
+        Hankel matrix of R(k + i τ + j τ), U(0) = P Σ Qᵀ and A = Σ^-½ Pᵀ U(1) Q Σ^-½; C and B from its first
+        block row and from [P Σ^½]⁺ H(0).
     """
     n_outputs, n_inputs = len(markov.outputs), len(markov.inputs)
     if step is None:
@@ -185,6 +187,14 @@ def decompose(markov: MarkovParameters, n_rows: int, n_columns: int) -> Decompos
 
     The decomposition is the exact one: that of H Hᵀ is cheaper and loses half the digits of weak modes.
 
+    Args:
+        markov: D, CB, CAB, …, shape (n_lags, n_outputs, n_inputs).
+        n_rows: block rows.
+        n_columns: block columns.
+
+    Returns:
+        Both matrices, and P, Σ and Q of the first.
+
     Raises:
         TooShortError: too few lags.
 
@@ -202,7 +212,12 @@ def _svd(H: Array) -> tuple[Array, Array, Array]:
 
 
 def hankel_size(markov: MarkovParameters, n_rows: int | None, n_columns: int | None) -> tuple[int, int]:
-    """Block rows and columns: as asked, or such that all lags are used at a bearable cost."""
+    """Block rows and columns: as asked, or such that all lags are used at a bearable cost.
+
+    Raises:
+        TooShortError: too few lags.
+        IdentificationError: no inputs or no outputs.
+    """
     if not markov.inputs or not markov.outputs:
         raise IdentificationError(
             f"{len(markov.outputs)} outputs and {len(markov.inputs)} inputs make no Hankel matrix; "

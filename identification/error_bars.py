@@ -28,6 +28,9 @@ def delta_method(covariance: Array, jacobian: Array, *, blind: Array | None = No
         blind: combinations of parameters that are not known at all, in columns; a function that one of them
             changes has an infinite standard deviation.
 
+    Returns:
+        Shape (n_functions,), in the unit of each function.
+
     Source: Kay (1993), eq. (3.30).
     """
     variance = np.einsum("fp,pq,fq->f", jacobian, covariance, jacobian, optimize=True)
@@ -81,6 +84,9 @@ def modes_with_std(tangent: Tangent, covariance: Array, *, blind: Array | None =
         tangent: the model and its derivatives with respect to the parameters.
         covariance: of the parameters, shape (n_parameters, n_parameters).
         blind: as for `delta_method`.
+
+    Returns:
+        The modes, each with both standard deviations.
 
     Source: first-order perturbation of a simple eigenvalue, ∂λ = wᴴ ∂A v / wᴴ v.
     """

@@ -67,8 +67,9 @@ def shift_invariance(
     Raises:
         OrderError: an order exceeds the columns of `U`, or the rows left when one block row is dropped.
 
-    Source: Kung (1978), 12th Asilomar Conf., the shift invariance of the observability matrix; nested over
-    the orders as in Döhler and Mevel (2012), Mech. Syst. Signal Process. 31.
+    Source: Kung (1978), 12th Asilomar Conf., the shift invariance O₁ A = O₂ of the observability matrix without
+        its last and without its first block row; nested over the orders as in Döhler and Mevel (2012), Mech.
+        Syst. Signal Process. 31.
     """
     orders = list(orders)
     n_max = max(orders, default=0)
@@ -116,11 +117,14 @@ def choose_order(P: Array, S: Array, Q: Array, *, n_outputs: int, n_inputs: int)
         n_outputs: rows of a block.
         n_inputs: columns of a block.
 
+    Returns:
+        The order and the reason.
+
     Raises:
         OrderError: the matrix is zero.
 
-    Source: Bandeira and van Handel (2016), Ann. Probab. 44(4), the norm of a matrix of unequal
-    independent noise.
+    Source: Bandeira and van Handel (2016), Ann. Probab. 44(4), the norm of a matrix of unequal independent noise:
+        about max_i (Σ_j σ_ij²)^½ + max_j (Σ_i σ_ij²)^½.
     """
     rows, columns = P.shape[0], Q.shape[0]
     s = np.maximum(S, np.finfo(float).eps * max(rows, columns) * S[0])

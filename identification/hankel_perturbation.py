@@ -23,6 +23,8 @@ def observability(A: Array, C: Array, n_rows: int) -> Array:
 
     Raises:
         IdentificationError: it grows beyond all bounds.
+
+    Source: Juang and Pappa (1985), J. Guidance 8(5), the left factor of H(0) = O Γ.
     """
     blocks = np.empty((n_rows, *C.shape))
     block = C

@@ -49,8 +49,8 @@ def next_era(
         TooShortError: the record has fewer samples than lags.
         RecordingError: a reference does not exist, or a sample is missing.
 
-    Source: James, Carne and Lauffer (1995), Int. J. Anal. Exp. Modal Anal. 10(4), 260-277; realized as in
-        Juang and Pappa (1985), J. Guidance 8(5).
+    Source: James, Carne and Lauffer (1995), Int. J. Anal. Exp. Modal Anal. 10(4), 260-277, R_k = C A^{k-1} G
+        for k >= 1; realized as in Juang (1992), thesis, eq. (3.15): A = Σ^-½ Pᵀ H(1) Q Σ^-½, C = [I 0 …] P Σ^½.
     """
     rows = reference_rows(recording, references)
     plan = plan_hankel(recording, order, orders, n_rows, rows.size)

@@ -83,13 +83,18 @@ def observe(recording: Recording, *, observer: int | None = None) -> Observer:
             from rest.
         observer: the length, or None.
 
+    Returns:
+        The predictor in channels of unit RMS, its error, and how its length was chosen.
+
     Raises:
         RecordingError: no inputs, a missing sample, or a channel that is zero throughout.
         TooShortError: too few samples.
         IdentificationError: the length asked for is less than one.
 
-    Source: Juang, Phan, Horta and Longman (1993), J. Guidance 16(2), without the assumption of rest;
-    the criterion is that of Hurvich and Tsai (1989), Biometrika 76(2), for several outputs.
+    Source: Juang, Phan, Horta and Longman (1993), J. Guidance 16(2), without the assumption of rest:
+        least squares for y(k) = D u(k) + Σ beta_i u(k-i) + Σ alpha_i y(k-i). The criterion is that of
+        Hurvich and Tsai (1989), Biometrika 76(2), for several outputs,
+        n log|E| + 2 n k q / (n - k - q - 1) with n rows, k columns, q outputs and mean square errors E.
     """
     _require_excitation(recording)
     scale = rms(recording)

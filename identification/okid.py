@@ -34,7 +34,8 @@ def okid(recording: Recording, *, n_lags: int | None = None, observer: int | Non
         RecordingError: no inputs, a missing sample, or a channel that is zero throughout.
         TooShortError: too few samples.
 
-    Source: Juang, Phan, Horta and Longman (1993), J. Guidance 16(2), 320-329.
+    Source: Juang, Phan, Horta and Longman (1993), J. Guidance 16(2), 320-329: the recursion from observer to
+        system Markov parameters, Y_k = beta_k + Σ alpha_i Y_(k-i), i = 1 … min(k, p), with beta_k = 0 for k > p.
     """
     found = observe(recording, observer=observer)
     Y = found.markov(4 * found.length + 1 if n_lags is None else n_lags)
@@ -69,7 +70,9 @@ def okid_era(
         TooShortError: as for `okid`.
         OrderError: an order exceeds what the observer can hold.
 
-    Source: Juang, Phan, Horta and Longman (1993), J. Guidance 16(2), 320-329.
+    Source: Juang, Phan, Horta and Longman (1993), J. Guidance 16(2), 320-329: the observer y(k) = D u(k) +
+        Σ beta_i u(k-i) + Σ alpha_i y(k-i), its Markov parameters as for `okid`, and their realization as in
+        Juang (1992), thesis, eq. (3.10), (3.15), (3.20).
     """
     found = observe(recording, observer=observer)
     p = found.length

@@ -31,6 +31,9 @@ def pulse_tangent(recording: Recording, realization: Realization, order: int) ->
 
     Raises:
         TooShortError: fewer samples than parameters.
+
+    Source: parametric bootstrap, Efron and Tibshirani (1993), section 6.5, of the model linearized as in
+        `hankel_tangent`.
     """
     markov, system = markov_parameters(recording), realization.at(order)
     std = residual_std(markov, system)

@@ -38,6 +38,9 @@ def least_squares(R: Array, right: Array, cutoff: float) -> tuple[Array, int]:
         R: shape (n_rows, n_columns).
         right: shape (n_rows, n_right).
         cutoff: singular values below this part of the largest count as zero, columns scaled to equal size.
+
+    Returns:
+        X, shape (n_columns, n_right), and the rank.
     """
     size = np.linalg.norm(R, axis=0)
     size[size == 0] = 1

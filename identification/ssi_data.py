@@ -52,9 +52,9 @@ def ssi_data(
         TooShortError: fewer samples than rows of the matrix.
         RecordingError: a reference does not exist, or a sample is missing.
 
-    Source: Peeters and De Roeck (1999), Mech. Syst. Signal Process. 13(6), the LQ factorization of the
-        block Hankel matrix of the outputs; its projection is L₂₁ Q₁ᵀ, and Q₁ does not change the left
-        singular vectors.
+    Source: Peeters and De Roeck (1999), Mech. Syst. Signal Process. 13(6), the LQ factorization
+        [Y_past; Y_future] = [L₁₁, 0; L₂₁, L₂₂] [Q₁; Q₂] of the block Hankel matrix of the outputs. The
+        projection Y_future / Y_past = L₂₁ Q₁ = O X̂, and Q₁ does not change the left singular vectors.
     """
     recording.require_complete()
     rows = reference_rows(recording, references)

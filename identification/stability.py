@@ -92,6 +92,9 @@ def stabilize(realization: Realization, **thresholds: float) -> Stabilization:
         realization: models of several orders.
         **thresholds: fields of `Thresholds` that shall differ from their defaults.
 
+    Returns:
+        All oscillating poles, and modes sorted by frequency with the largest component of each shape one.
+
     Raises:
         IdentificationError: there is no threshold of that name.
 

@@ -37,6 +37,9 @@ def itd(
         n_rows: as for `era`.
         n_columns: as for `era`.
 
+    Returns:
+        Poles, shapes and participations, Y(k) = Ψ Λᵏ L.
+
     Raises:
         OrderError: `order` exceeds the numerical rank.
         TooShortError: too few lags.
@@ -71,6 +74,9 @@ def mrtd(
         n_rows: as for `era`.
         n_columns: as for `era`.
 
+    Returns:
+        Poles, shapes and participations, Y(k) = Ψ Λᵏ L.
+
     Raises:
         OrderError: `order` exceeds the numerical rank.
         TooShortError: too few lags.
@@ -97,6 +103,9 @@ def mmrtd(
         order: number of states; chosen from the singular values when None.
         n_rows: as for `era`.
         n_columns: as for `era`.
+
+    Returns:
+        Poles, shapes and participations, Y(k) = Ψ Λᵏ L.
 
     Raises:
         OrderError: `order` exceeds the numerical rank.
@@ -126,6 +135,9 @@ def mrtd_real(
         n_rows: as for `era`.
         n_columns: as for `era`.
         orders: further orders to realize.
+
+    Returns:
+        Models of all orders asked for, and all singular values of H(0).
 
     Raises:
         OrderError: an order exceeds the numerical rank.
@@ -159,6 +171,9 @@ def mmrtd_real(
         n_columns: as for `era`.
         orders: further orders to realize.
 
+    Returns:
+        Models of all orders asked for, and all singular values of H(0).
+
     Raises:
         OrderError: an order exceeds the numerical rank.
         TooShortError: too few lags.
@@ -182,6 +197,9 @@ def change_of_form(singular_values: Array, order: int, source: str, target: str)
         order: number of states.
         source: one of `FORMS`; MRTD is output_normal, MMRTD is input_normal.
         target: likewise.
+
+    Returns:
+        The diagonal matrix of powers of Σ.
 
     Raises:
         IdentificationError: a form is unknown.

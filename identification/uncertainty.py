@@ -99,6 +99,9 @@ def matrices_with_error_bars(
         matrices: those of its model of the given order.
         order: number of states.
 
+    Returns:
+        The same matrices with their standard deviations.
+
     Raises:
         TooShortError: too few data to tell.
         IdentificationError: the method or the model allows no error bars; says why.
