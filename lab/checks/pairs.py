@@ -34,8 +34,11 @@ LEFT_OUT = 0.2
 CHANGE = 0.03
 """What is lost for each channel in another place or with another sign."""
 
-FREE = 3
-"""Pairs from which on another order of the channels can be told from other pairs."""
+WORTH = 0.3
+"""Gain of agreement for which channels may have changed places."""
+
+FREE = 2
+"""Pairs from which on channels may change places; one more, and each may have a factor."""
 
 BAND = 0.8
 """Share of half the sample rate up to which modes are compared."""
@@ -81,6 +84,8 @@ class Pairs:
 def pairs_of(recording: Recording, rig: Rig) -> Pairs | None:
     """Pairs of modes; None when the recording shows none of the model's.
 
+    Outputs alone tell the modes here, since an input may be what is wrong.
+
     Args:
         recording: complete.
         rig: the model with the recording's channels connected, in their order.
@@ -88,7 +93,7 @@ def pairs_of(recording: Recording, rig: Rig) -> Pairs | None:
     Raises:
         IdentificationError: the recording tells no modes.
     """
-    found = identify(recording, uncertainty=False)
+    found = identify(recording.select(inputs=[]), "ssi_cov", uncertainty=False)
     measured = _credible(found.modes.take(np.array(found.stable, dtype=bool)), recording.sample_rate)
     modelled = rig.modes()
     seen = np.linalg.norm(modelled.shapes, axis=0) > 0
@@ -97,18 +102,11 @@ def pairs_of(recording: Recording, rig: Rig) -> Pairs | None:
         return None
     measured, modelled = (modes.take(np.arange(min(len(modes), MAX_MODES))) for modes in (measured, modelled))
     phi, psi = _real(measured.shapes), _real(modelled.shapes)
-    best, score = _as_named(measured, modelled, phi, psi), 0.0
-    if best:
-        score = float(np.sum(_values(best, phi, psi)))
-    if not best or score < FITS * len(best):
-        # Another rate must bring at least three modes together, and better than the written one does.
-        for ratio in np.unique(np.divide.outer(measured.frequency_hz, modelled.frequency_hz)):
-            other = _matched(measured, modelled, float(ratio), TIGHT)
-            value = float(np.sum(_values(other, phi, psi))) if len(other) >= 3 else 0.0
-            if value > max(1.3 * score, FITS * len(other), 2.5):
-                best, score = other, value
-    if not best or score < FITS * len(best):
-        best = _in_any_order(measured, modelled, phi, psi) or best
+    named, named_score = _as_named(measured, modelled, phi, psi)
+    free, free_score = _in_any_order(measured, modelled, phi, psi)
+    best = free if free_score > named_score + WORTH else named
+    if not best or _agreement(named, phi, psi) < FITS:
+        best = _at_another_rate(measured, modelled, phi, psi) or best
     if not best and len(measured) == 1 == len(modelled):
         best = [(0, 0)]
     if not best:
@@ -117,29 +115,47 @@ def pairs_of(recording: Recording, rig: Rig) -> Pairs | None:
     return Pairs(phi[:, rows], psi[:, columns], measured.frequency_hz[rows], modelled.frequency_hz[columns])
 
 
-def _as_named(measured: Modes, modelled: Modes, phi: Array, psi: Array) -> Matching:
-    """The rising pairs that agree best with the channels as they are named."""
-    return max(
-        _rising(measured, modelled),
-        key=lambda pairs: np.sum(_values(pairs, phi, psi) - ALIKE) - _stretch(pairs, measured, modelled),
-        default=[],
-    )
-
-
-def _in_any_order(measured: Modes, modelled: Modes, phi: Array, psi: Array) -> Matching:
-    """The rising pairs that agree best when channels may change places, signs and factors."""
-    best, highest = [], 0.0
+def _as_named(measured: Modes, modelled: Modes, phi: Array, psi: Array) -> tuple[Matching, float]:
+    """The rising pairs that agree best with the channels as they are named, and how well."""
+    best: Matching = []
+    highest = 0.0
     for pairs in _rising(measured, modelled):
-        if len(pairs) < (FREE if len(phi) > 2 else 2):
-            continue
+        score = float(np.sum(_values(pairs, phi, psi) - ALIKE)) - _stretch(pairs, measured, modelled)
+        if score > highest:
+            best, highest = pairs, score
+    return best, highest
+
+
+def _in_any_order(measured: Modes, modelled: Modes, phi: Array, psi: Array) -> tuple[Matching, float]:
+    """The same when channels may change places, signs and factors."""
+    best: Matching = []
+    highest = 0.0
+    choices = [pairs for pairs in _rising(measured, modelled) if len(pairs) >= FREE]
+    promised = [len(pairs) * (1 - ALIKE) - _stretch(pairs, measured, modelled) for pairs in choices]
+    for k in np.argsort(-np.array(promised), kind="stable"):
+        if promised[k] <= highest:
+            break  # the rest cannot agree better
+        pairs = choices[k]
         rows, columns = np.array(pairs).T
-        for a, b in ((phi, psi), (balanced(phi[:, rows]), balanced(psi[:, columns]))):
-            a, b = (a[:, rows], b[:, columns]) if a is phi else (a, b)
+        shapes = [(phi[:, rows], psi[:, columns])]
+        if len(pairs) > FREE:
+            shapes.append((balanced(phi[:, rows]), balanced(psi[:, columns])))
+        for a, b in shapes:
             found = best_arrangement(a, b)
-            score = float(np.sum(macs(found.arranged(a), b) - ALIKE)) - _stretch(pairs, measured, modelled)
-            score -= CHANGE * found.n_changes
+            score = float(np.sum(macs(found.arranged(a), b) - ALIKE)) - CHANGE * found.n_changes
+            score -= _stretch(pairs, measured, modelled)
             if score > highest:
                 best, highest = pairs, score
+    return best, highest
+
+
+def _at_another_rate(measured: Modes, modelled: Modes, phi: Array, psi: Array) -> Matching:
+    """Three pairs or more whose frequencies have one ratio, and whose shapes agree as named; none when there are none."""
+    best: Matching = []
+    for ratio in np.unique(np.divide.outer(measured.frequency_hz, modelled.frequency_hz)):
+        pairs = _matched(measured, modelled, float(ratio), TIGHT)
+        if len(pairs) > max(len(best), 2) and _agreement(pairs, phi, psi) > FITS:
+            best = pairs
     return best
 
 
@@ -169,6 +185,11 @@ def _stretch(pairs: Matching, measured: Modes, modelled: Modes) -> float:
     return left_out + STRETCHED * float(
         np.sum(np.abs(np.log(measured.frequency_hz[rows] / modelled.frequency_hz[columns])))
     )
+
+
+def _agreement(pairs: Matching, phi: Array, psi: Array) -> float:
+    """Mean MAC with the channels as they are named; 0 without pairs."""
+    return float(np.mean(_values(pairs, phi, psi))) if pairs else 0.0
 
 
 def _values(pairs: Matching, phi: Array, psi: Array) -> Array:

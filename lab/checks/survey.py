@@ -18,10 +18,6 @@ from lab.checks.pairs import Pairs, pairs_of
 from lab.checks.remark import Trace
 from lab.rig import Rig
 
-RANDOM = ("random", "other")
-HELPFUL = 0.7
-"""Share of the outputs' power that inputs must explain for modes to be found with their help."""
-
 WHITENING = 32
 """Order of the filters that flatten spectra."""
 
@@ -139,17 +135,10 @@ class Survey:
         if self.rig is None:
             return None, "there is no model"
         try:
-            found = pairs_of(self._to_identify(), self.rig)
+            found = pairs_of(self.recording, self.rig)
         except IdentificationError as error:
             return None, str(error)
         return found, "" if found else "no mode of the recording lies near one of the model's"
-
-    def _to_identify(self) -> Recording:
-        """The recording, without inputs that explain too little of a random motion to be of help."""
-        random = all(sheet.record.kind in RANDOM and sheet.n_inputs for sheet in self.sheets)
-        if random and np.nanmedian(self.sheets[0].explained()) < HELPFUL:
-            return self.recording.select(inputs=[])
-        return self.recording
 
     @property
     def same_units(self) -> bool:
