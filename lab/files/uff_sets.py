@@ -49,6 +49,9 @@ def _read(file: Any, number: int, kind: int) -> dict[str, Any]:
         raise FileError(f"data set {number + 1} (type {kind}) cannot be read; it is damaged") from None
     if kind == 58:
         _check_function(found, number)
+    fields = {15: "xyz", 2411: "xyz", 55: ("r1", "r2", "r3")}.get(kind, ())
+    if any(len(found[field]) != len(found["node_nums"]) for field in fields if "node_nums" in found):
+        raise FileError(f"data set {number + 1} (type {kind}) ends within a node; it is damaged")
     return found
 
 

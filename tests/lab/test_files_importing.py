@@ -12,6 +12,7 @@ from lab.files.recipe import Recipe, load_recipe, parse_recipe
 from lab.files.recording import load
 from lab.files.recording_responses import load_responses
 from lab.files.units import to_si
+from tests.lab import universal
 
 READINGS = np.random.default_rng(8).integers(-900, 900, size=(12, 2)).astype(float)
 RECIPE = """
@@ -236,3 +237,48 @@ def test_nothing_is_left_behind_when_writing_fails(tmp_path):
 def test_units_of_the_recipe_are_those_of_the_lab():
     assert to_si("cm") == ("m", 0.01)
     assert Recipe().kind is None
+
+
+def test_signals_and_responses_of_one_file_lie_in_one_recording(tmp_path):
+    f = np.arange(1, 9) * 0.5
+    H = np.random.default_rng(11).normal(size=(8, 2)) @ [1, 1j]
+    about = {"kind": 4, "x_type": 18, "below_type": 13, "below_label": "N", "ref_node": 1, "ref_direction": 1}
+    signal = universal.function(READINGS[:, 0], np.arange(12) / 50, binary="<")
+    (tmp_path / "both.uff").write_bytes(signal + universal.function(H, f, binary="<", **about))
+    save_imported(read_foreign(tmp_path / "both.uff"), tmp_path / "out.h5")
+    np.testing.assert_array_equal(load(tmp_path / "out.h5").records[0].outputs[0], READINGS[:, 0])
+    np.testing.assert_array_equal(load_responses(tmp_path / "out.h5").values[:, 0, 0], H)
+
+
+@pytest.mark.parametrize("name", ["text.uff", "binary.uff", "table.csv"])
+def test_a_file_with_bytes_changed_or_lost_is_read_or_refused_in_one_line(tmp_path, name):
+    rng = np.random.default_rng(12)
+    t = np.arange(12) / 50
+    whole = {
+        "text.uff": universal.nodes({1: (0, 0, 1.0)})
+        + universal.units(1.0, 1.0)
+        + universal.function(READINGS[:, 0], t)
+        + universal.mode(1, {1: [1j, 0, 2.0]}, pole=-1 + 9j),
+        "binary.uff": universal.function(READINGS[:, 0], t, binary="<"),
+        "table.csv": b"I,X\n" + b"".join(b"%g,%g\n" % tuple(row) for row in READINGS),
+    }[name]
+    recipe = (
+        parse_recipe(RECIPE.partition("[table]")[0] + RECIPE.partition('"X"]\n')[2])
+        if name == "table.csv"
+        else None
+    )
+    messages = []
+    for _ in range(60):
+        broken = bytearray(whole)
+        start = int(rng.integers(len(whole)))
+        if rng.random() < 0.5:
+            broken[start] = int(rng.integers(256))
+        else:
+            del broken[start : start + int(rng.integers(1, 60))]
+        (tmp_path / name).write_bytes(broken)
+        try:
+            read_foreign(tmp_path / name, recipe)
+        except FileError as error:
+            messages.append(str(error))
+    assert messages
+    assert not [message for message in messages if "\n" in message]
