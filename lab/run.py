@@ -207,7 +207,12 @@ def _diagnosed(
         diagnosis, scenario.hidden(), verdict=asked.verdict, parameter_error=asked.parameter_error
     )
     said = f"Diagnosis, in the folder diagnosis: {verdict_of(diagnosis, recording).sentence}"
-    return replace(result, criteria=(*result.criteria, *judged), notes=(*result.notes, said))
+    return replace(
+        result,
+        criteria=(*result.criteria, *judged),
+        notes=(*result.notes, said),
+        explanation=f"{result.explanation} {said}".strip(),
+    )
 
 
 def _record(path: Path, rig: Rig, scenario: Scenario, progress: Progress | None) -> None:

@@ -7,7 +7,9 @@ from pathlib import Path
 
 from identification.recording import Recording
 from lab.diagnosis.outcome import Diagnosis
+from lab.diagnosis.restoring import restoring_force
 from lab.show.figures.diagnosis import draw_diagnosis
+from lab.show.figures.restoring import restoring_figure
 from lab.show.findings import (
     alternative_table,
     calibration_table,
@@ -41,6 +43,8 @@ def write_diagnosis_report(
         facts: further facts to reproduce the diagnosis, by name.
     """
     path = Path(path)
+    restoring = restoring_force(diagnosis, recording)
+    force = () if restoring is None else (restoring_figure(restoring),)
     own = {**surroundings(), **checksums(path.parent, BESIDE)}
     page = template("diagnosis.html.jinja").render(
         title=f"{recording.title or diagnosis.nominal.name}: diagnosis",
@@ -51,7 +55,7 @@ def write_diagnosis_report(
         alternatives=alternative_table(diagnosis),
         errors=error_table(diagnosis),
         calibration=calibration_table(diagnosis),
-        figures=[inline(drawing) for drawing in draw_diagnosis(diagnosis, recording)],
+        figures=[inline(drawing) for drawing in (*force, *draw_diagnosis(diagnosis, recording))],
         explanation="",
         warnings=diagnosis.warnings,
         unlearnable=diagnosis.unlearnable,

@@ -156,6 +156,7 @@ def test_the_page_says_the_verdict_first_and_needs_nothing_else(page):
     visible = " ".join("".join(parsed.text).split())
     for part in (
         SAYS,
+        "Force of the spring spring0_1 over its extension",
         "k3 = (5000000 ± 40000) N/m^3",
         "434.2",
         "1.0020 ± 0.0010",
@@ -248,8 +249,9 @@ def test_every_view_looks_at_an_entity(read):
     views = read.views()
     assert [origin for _, origin in views if origin not in read.entities] == []
     kinds = [kind for kind, _ in views]
-    # Two channels, predicted and residual; two structures; one summary.
-    assert {kind: kinds.count(kind) for kind in kinds} == {"TimeSeries": 4, "3D": 2, "TextDocument": 1}
+    # Two channels, predicted and residual; two structures; one summary; the force of the spring that hardens.
+    expected = {"TimeSeries": 4, "3D": 2, "TextDocument": 1, "2D": 1}
+    assert {kind: kinds.count(kind) for kind in kinds} == expected
     assert "/structure/extended/bodies/mass1" in read.entities
 
 

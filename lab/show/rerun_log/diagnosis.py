@@ -13,10 +13,12 @@ import rerun.blueprint as rrb
 
 from identification.recording import Array, Record, Recording
 from lab.diagnosis.outcome import Diagnosis
+from lab.diagnosis.restoring import restoring_force
 from lab.show import structure
 from lab.show.drawing import SERIES, rgb
 from lab.show.findings import calibration_table, error_table, finding_table, verdict_of
 from lab.show.rerun_log.plot import plain
+from lab.show.rerun_log.restoring import log_restoring
 from lab.show.rerun_log.scene import (
     MAX_NAMED,
     TIMELINE,
@@ -101,6 +103,9 @@ def write_diagnosis_rrd(
             ),
             rrb.Vertical(*left, name="Residuals"),
         ]
+        restoring = restoring_force(diagnosis, recording)
+        if restoring is not None:
+            tabs.append(rrb.Vertical(log_restoring(stream, restoring), name="Restoring force"))
         if motions is not None:
             tabs.append(rrb.Horizontal(*_log_structures(stream, diagnosis, motions), name="Structure"))
         stream.send_blueprint(
