@@ -2,17 +2,22 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
-from identification.errors import IdentificationError, RecordingError
+from identification.errors import IdentificationError, NotSecondOrderError, RecordingError
 from identification.likelihood import SUSPICIOUS, Estimate, refine
 from identification.modes import Modes
 from identification.recording import Recording
+from identification.second_order import second_order
 from identification.segments import TRANSIENT
 from identification.structures import free_matrices
 from identification.systems import SecondOrder, StateSpace
+
+FEW = 20
+"""Steps from the likeliest model with free initial states to that from rest, where it is near."""
 
 FAR = 0.2
 """Relative distance of a refined pole beyond which it is another mode."""
@@ -68,35 +73,46 @@ def refinement(
     _require_forces(recording)
     if not len(modes):
         raise IdentificationError("there is no mode to refine; record for longer or try another method")
-    structure, warnings = _structure(recording, matrices)
-    if structure is not None:
-        return _of_structure(structure, modes)
     start = system if system is not None and len(system.inputs) == len(recording.inputs) else modes
     found = _likeliest(recording, start)
-    if not found.converged or not _has_all(found, modes):
+    structure, warnings = (None, ()) if matrices is None else _structure(recording, matrices, found)
+    if structure is not None:
+        return _told("Mass, damping and stiffness, and with them the modes, were", structure, modes, warnings)
+    if not found.converged or not len(found.modes):
         raise IdentificationError(
             f"the likelihood has no maximum near the modes found ({found.n_iterations} steps); take another method or "
             "order to start from"
         )
-    nearest = np.array(_partners(found.modes, modes)[0])
-    rank = np.argsort(nearest)
-    own = found.modes.take(nearest[rank]).normalized()
-    sentence = _sentence("The modes were", found)
-    return Refinement(found, own, tuple(rank.tolist()), None, sentence, (*warnings, *found.notes))
+    return _told("The modes were", found, modes, warnings)
 
 
-def _structure(recording: Recording, matrices: SecondOrder | None) -> tuple[Estimate | None, tuple[str, ...]]:
-    """The likeliest M, C, K, or why there are none."""
-    if matrices is None:
-        return None, ()
-    try:
-        found = _likeliest(recording, matrices)
-        if found.converged:
-            return found, ()
-        why = f"no maximum near the start ({found.n_iterations} steps)"
-    except IdentificationError as error:
-        why = str(error)
+def _structure(
+    recording: Recording, matrices: SecondOrder, found: Estimate
+) -> tuple[Estimate | None, tuple[str, ...]]:
+    """The likeliest M, C, K, or why there are none.
+
+    Modes bear a worse start than matrices do, so that the matrices of the refined modes are tried first.
+    """
+    why = ""
+    for start in (_matrices_of(found, matrices.dofs), matrices):
+        if start is None:
+            continue
+        try:
+            structure = _likeliest(recording, start)
+        except IdentificationError as error:
+            why = why or str(error)
+            continue
+        if structure.converged and len(structure.modes):
+            return structure, ()
+        why = why or f"no maximum near the start ({structure.n_iterations} steps)"
     return None, (f"Mass, damping and stiffness could not be refined: {why}.",)
+
+
+def _matrices_of(found: Estimate, dofs: Sequence[str]) -> SecondOrder | None:
+    try:
+        return second_order(found.system, dofs=dofs)
+    except NotSecondOrderError:
+        return None
 
 
 def _require_forces(recording: Recording) -> None:
@@ -110,62 +126,45 @@ def _require_forces(recording: Recording) -> None:
 
 
 def _likeliest(recording: Recording, start: SecondOrder | StateSpace | Modes) -> Estimate:
-    """The estimate from rest, or with free initial states where the data ask for them."""
+    """The estimate with free initial states, or from rest where the data do not ask for them."""
     structure = free_matrices(start.dofs) if isinstance(start, SecondOrder) else None
-    found = refine(recording, start, parameterization=structure)
     if all(record.kind in TRANSIENT for record in recording.records):
-        return found
-    near = found.second_order or found.system
-    free = refine(recording, near, parameterization=structure, initial_state="free")
+        return refine(recording, start, parameterization=structure)
+    free = refine(recording, start, parameterization=structure, initial_state="free")
+    rest = refine(recording, free.second_order or free.system, parameterization=structure, max_iterations=FEW)
     n_states = sum(x.size for x in free.initial_states)
     n_values = recording.n_samples * len(recording.outputs)
-    gain = free.log_likelihood - found.log_likelihood
-    return free if gain > 0.5 * n_states * np.log(n_values) else found
+    gain = free.log_likelihood - rest.log_likelihood
+    return rest if rest.converged and gain < 0.5 * n_states * np.log(n_values) else free
 
 
-def _partners(refined: Modes, modes: Modes) -> tuple[list[int], list[bool]]:
-    """The nearest refined mode to each mode, and whether it is near."""
-    gap = np.abs(refined.poles[:, None] - modes.poles) / np.abs(modes.poles)
-    nearest = np.argmin(gap, axis=0)
-    near = gap[nearest, np.arange(len(modes))] < FAR
-    return nearest.tolist(), near.tolist()
-
-
-def _has_all(found: Estimate, modes: Modes) -> bool:
-    """Whether each of the modes has a refined one of its own."""
-    if len(found.modes) < len(modes):
-        return False
-    nearest, near = _partners(found.modes, modes)
-    return all(near) and len(set(nearest)) == len(modes)
-
-
-def _of_structure(found: Estimate, modes: Modes) -> Refinement:
-    """All modes of M, C, K; those of the method that are none of these are said to be lost."""
-    nearest, near = _partners(found.modes, modes)
-    lost = [k for k in range(len(modes)) if not near[k] or nearest.index(nearest[k]) != k]
-    warnings = found.notes
-    if lost:
-        listed = ", ".join(f"{modes.frequency_hz[k]:.4g}" for k in lost)
-        white = float(np.min(found.whiteness)) >= SUSPICIOUS
-        why = (
-            "these leave nothing but white noise, so they are taken for noise"
-            if white
-            else "these leave more than white noise, so they may be real; refine with another method or order"
-        )
-        warnings = (
-            f"The modes at {listed} Hz are not among those of mass, damping and stiffness; {why}.",
-            *warnings,
-        )
-    partners = np.argmin(np.abs(modes.poles[:, None] - found.modes.poles), axis=0)
-    sentence = _sentence("Mass, damping and stiffness, and with them the modes, were", found)
-    return Refinement(
-        found, found.modes.normalized(), tuple(partners.tolist()), found.second_order, sentence, warnings
-    )
-
-
-def _sentence(what: str, found: Estimate) -> str:
+def _told(what: str, found: Estimate, modes: Modes, warnings: tuple[str, ...]) -> Refinement:
+    """The estimate in words; modes of the method that are none of its modes are said to be lost."""
+    gap = np.abs(found.modes.poles[:, None] - modes.poles) / np.abs(modes.poles)
+    partners, nearest = np.argmin(gap, axis=1), np.argmin(gap, axis=0)
+    lost = [k for k in range(len(modes)) if partners[nearest[k]] != k or gap[nearest[k], k] > FAR]
     free = ", with free initial states," if found.initial_states else ""
-    return (
+    sentence = (
         f"{what} moved{free} to the maximum of the output-error likelihood over {len(found.names)} parameters in "
         f"{found.n_iterations} steps."
     )
+    return Refinement(
+        found,
+        found.modes.normalized(),
+        tuple(partners.tolist()),
+        found.second_order,
+        sentence,
+        (*warnings, *_on_lost(found, [float(modes.frequency_hz[k]) for k in lost]), *found.notes),
+    )
+
+
+def _on_lost(found: Estimate, frequencies: list[float]) -> tuple[str, ...]:
+    if not frequencies:
+        return ()
+    listed = ", ".join(f"{f:.4g}" for f in frequencies)
+    left = (
+        "what it leaves is white noise"
+        if float(np.min(found.whiteness)) >= SUSPICIOUS
+        else "it leaves more than white noise, so they may be real"
+    )
+    return (f"The likeliest model has no modes near those found at {listed} Hz; {left}.",)
