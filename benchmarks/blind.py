@@ -7,7 +7,8 @@ right, false alarms, parameters within two standard deviations and their median 
 seconds; then detection against the best possible test, what was said of every cause, and every answer that is not right.
 
     python benchmarks/blind.py [--cases 24] [--seed 0] [--family singles sparse …] [--only CAUSE] [--withhold]
-                               [--strength 1 0.3 0.1] [--jobs 1] [--out blind.jsonl] [--write DIR] [--table]
+                               [--strength 1 0.3 0.1] [--masses 3] [--samples 2048] [--jobs 1] [--out blind.jsonl]
+                               [--write DIR] [--table]
 """
 
 from __future__ import annotations
@@ -19,7 +20,7 @@ import os
 import sys
 import time
 from concurrent.futures import ProcessPoolExecutor
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -29,7 +30,7 @@ sys.path.insert(0, str(Path(__file__).resolve().parent.parent))
 
 import numpy as np
 
-from benchmarks.blind_cases.draw import FAMILIES, draw
+from benchmarks.blind_cases.draw import FAMILIES, Family, draw
 from benchmarks.blind_cases.judge import judged, said
 from benchmarks.blind_cases.table import tables
 from benchmarks.blind_cases.truth import Case
@@ -50,16 +51,26 @@ class Trial:
     only: str | None = None
     withheld: bool = False
     strength: float = 1.0
+    masses: int | None = None
+    samples: int | None = None
 
     @property
     def key(self) -> dict[str, Any]:
         """Plain data that tells trials apart."""
         return vars(self)
 
+    @property
+    def kind(self) -> Family:
+        """The family, with as many masses and samples as asked for."""
+        kind = FAMILIES[self.family]
+        if self.masses is not None and kind.masses is not None:
+            kind = replace(kind, masses=(self.masses, self.masses))
+        return kind if self.samples is None else replace(kind, n_samples=self.samples)
+
 
 def answered(trial: Trial, write: Path | None = None) -> dict[str, Any]:
     """The judged answer of one trial."""
-    case = draw(trial.seed, trial.family, only=trial.only, strength=trial.strength)
+    case = draw(trial.seed, trial.family, kind=trial.kind, only=trial.only, strength=trial.strength)
     if write is not None:
         written(case, write / f"{trial.family}_{trial.seed}")
     effects = dict(EFFECTS)
@@ -126,6 +137,8 @@ def main(arguments: list[str] | None = None) -> None:
     parser.add_argument("--only", help="hide this cause only")
     parser.add_argument("--withhold", action="store_true", help="take the hidden cause out of the catalogue")
     parser.add_argument("--strength", type=float, nargs="+", default=[1.0], help="times the usual sizes")
+    parser.add_argument("--masses", type=int, help="of every network, instead of the family's own number")
+    parser.add_argument("--samples", type=int, help="of every record, instead of the family's own number")
     parser.add_argument("--jobs", type=int, default=1)
     parser.add_argument("--out", type=Path, default=Path("blind.jsonl"), help="answers, one JSON line each")
     parser.add_argument("--write", type=Path, help="folder for the cases as files")
@@ -135,7 +148,7 @@ def main(arguments: list[str] | None = None) -> None:
     if not options.table:
         seeds = range(options.seed, options.seed + options.cases)
         trials = [
-            Trial(family, seed, options.only, options.withhold, strength)
+            Trial(family, seed, options.only, options.withhold, strength, options.masses, options.samples)
             for seed, family, strength in itertools.product(seeds, options.family, options.strength)
         ]
         run(trials, options.out, jobs=options.jobs, write=options.write)

@@ -105,6 +105,7 @@ def failure(row: Row) -> str:
     case += (" withheld" if row["withheld"] else "") + (
         f" × {row['strength']:g}" if row["strength"] != 1 else ""
     )
+    case += "".join(f" {name} {row[name]}" for name in ("masses", "samples") if row.get(name))
     if "error" in row:
         return f"  {case}: {row['error']}"
     hidden = (
