@@ -116,7 +116,7 @@ def identify(
         after += missing
     warnings = (
         *_order_warnings(realization, modes),
-        *(horizon_warning(modes, realization) if name == "ssi_cov" else ()),
+        *(horizon_warning(modes, realization) if name in (*NESTED, "era") else ()),
         *(() if refined else _length_warnings(recording, realization, modes)),
         *doubts,
     )

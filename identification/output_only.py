@@ -207,16 +207,26 @@ def _sorted_orders(order: int | None, orders: Iterable[int] | None) -> list[int]
 
 
 def horizon_warning(modes: Modes, realization: Realization) -> tuple[str, ...]:
-    """One sentence when the horizon is shorter than a third of a period of the slowest light mode, or none."""
+    """One sentence when the horizon is shorter than half a period of the slowest light mode, or none.
+
+    Args:
+        modes: those found.
+        realization: from a Hankel matrix, with its size in the settings; calculated data need no longer horizon.
+
+    Source: Reynders and De Roeck (2008), Mech. Syst. Signal Process. 22(3), the least number of block rows.
+    """
     light = modes.frequency_hz[(modes.damping_ratio > 0) & (modes.damping_ratio < 0.3)]
-    if not light.size:
+    s, order = realization.singular_values, realization.order
+    if not light.size or (order < s.size and s[order] <= 1e-8 * s[0]):
         return ()
-    n_rows, rate = int(realization.settings["n_rows"]), 1 / realization.system.dt
-    if 3 * n_rows * light[0] >= rate:
+    settings, rate = realization.settings, 1 / realization.system.dt
+    n_columns = int(settings["n_columns"]) * int(settings.get("stride", 1))
+    n, what = min((int(settings["n_rows"]), "rows"), (n_columns, "columns"))
+    if 2 * n * light[0] >= rate:
         return ()
     return (
-        f"{n_rows} block rows span less than a third of a period of the mode at {light[0]:.4g} Hz, which is "
-        f"then mostly noise; take about {math.ceil(2 / 3 * rate / light[0])} block rows.",
+        f"{n} block {what} span less than half a period of the mode at {light[0]:.4g} Hz, which is "
+        f"then mostly noise; take about {math.ceil(2 / 3 * rate / light[0])} block {what}.",
     )
 
 

@@ -129,8 +129,8 @@ def test_growing_modes_and_short_horizons_are_warned_of():
     assert sum("grows in time" in warning for warning in found.warnings) == growing
     assert [bool(z >= 0) for z in found.modes.damping_ratio] == list(found.stable)
     found = identify(ambient(20_000, 6), order=14, n_rows=4)
-    assert any("less than a third of a period" in warning for warning in found.warnings)
-    assert not any("less than a third of a period" in note for note in found.notes)
+    assert any("less than half a period" in warning for warning in found.warnings)
+    assert not any("less than half a period" in note for note in found.notes)
 
 
 def test_an_order_at_the_limit_of_the_horizon_is_warned_of():

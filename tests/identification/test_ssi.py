@@ -167,7 +167,7 @@ def test_the_horizon_is_chosen_and_explained():
 
 def test_too_short_a_horizon_is_noted():
     realization = ssi_cov(ambient(20_000, 10), order=14, n_rows=5)
-    assert any("less than a third of a period of the mode at 1.6" in note for note in realization.notes)
+    assert any("less than half a period of the mode at 1.6" in note for note in realization.notes)
     assert not horizon_warning(TRUTH, ssi_cov(ambient(20_000, 10), order=14, n_rows=12))
 
 
