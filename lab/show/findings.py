@@ -31,6 +31,12 @@ class Table:
 def verdict_of(diagnosis: Diagnosis, recording: Recording) -> Verdict:
     """What the diagnosis comes to, in a few sentences for an engineer."""
     e = diagnosis.errors
+    if diagnosis.verdict == CONSISTENT and diagnosis.spectra is not None:
+        text = (
+            "Consistent: the model agrees with the spectra within scatter and small calibration; on data kept aside it errs by "
+            f"{share(e.calibrated)}, and scatter alone makes {share(e.noise_floor)}."
+        )
+        return Verdict(PASSED, text)
     if diagnosis.verdict == CONSISTENT:
         text = (
             "Consistent: the model agrees with the recording within noise and small calibration; on data kept aside it "
@@ -44,6 +50,11 @@ def verdict_of(diagnosis: Diagnosis, recording: Recording) -> Verdict:
     )
     if diagnosis.verdict == EXPLAINED:
         return Verdict(FOUND, f"Explained: {said} {fall}")
+    if diagnosis.spectra is not None:
+        told = diagnosis.warnings[0] if diagnosis.warnings else "something is left"
+        return Verdict(
+            FAILED, f"Unexplained: {told}.{f' What was explained so far: {said}' if said else ''} {fall}"
+        )
     so_far = f" What was explained so far: {said}" if said else ""
     left = "Unexplained: something is left that no cause in the catalogue explains, "
     return Verdict(FAILED, f"{left}{where(leftover(diagnosis, recording))}.{so_far} {fall}")

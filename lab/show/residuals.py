@@ -9,12 +9,15 @@ import numpy as np
 from numpy.typing import NDArray
 
 from identification.recording import Array, Recording
-from lab.diagnosis.outcome import Diagnosis, Prediction
+from lab.diagnosis.outcome import Diagnosis, Prediction, SpectralPrediction
 from lab.show.signals import Spectra, spectra
 
 MODELS = ("nominal", "calibrated", "extended")
 N_WINDOWS = 60
 """Stretches into which all records together are cut."""
+
+MAX_ROWS = 6
+"""Spectra shown."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -153,3 +156,11 @@ def _growth(motion: Array, error: Array) -> float:
     order = np.argsort(motion, kind="stable")
     calm, lively = (np.sqrt(np.mean(error[part] ** 2)) for part in (order[:quarter], order[-quarter:]))
     return float(lively / calm) if calm > 0 else 1.0
+
+
+def worst_rows(spectra: SpectralPrediction) -> list[int]:
+    """Rows to show, in their order: those whose logarithm the calibrated model misses most."""
+    tiny = 1e-300
+    error = np.log(np.maximum(spectra.measured, tiny)) - np.log(np.maximum(spectra.calibrated, tiny))
+    order = np.argsort(-np.mean(error**2, axis=1), kind="stable")
+    return sorted(int(row) for row in order[:MAX_ROWS])

@@ -39,6 +39,10 @@ from lab.rig import Rig
 from lab.twin import twin
 
 MOST_FINDINGS = 4
+DOUBT = 5.0
+"""By how much -2 log likelihood of data kept aside may rise by chance with a true cause."""
+FAR = 3.0
+"""Standard deviations beyond which a calibrated parameter may hide a cause, so that the model as given is a better start."""
 RIGID = 1e12
 """Precision of a prior that lets a parameter not move."""
 
@@ -110,15 +114,20 @@ def diagnose_spectra(
     tell("calibrating")
     stage = origin = _calibrated(_experiment(data, rig, band), rig, parameters)
     visible = {name: kind for name, kind in effects.items() if name in stage.experiment.visible}
+    given = _as_given(stage.likelihood, stage.fit)
     first: list[Candidate | FoundTone] = []
+    refused: Candidate | FoundTone | None = None
     while len(stage.accepted) < MOST_FINDINGS:
         tell("searching for causes" if not stage.accepted else f"searching on, {len(stage.accepted)} found")
-        ranked, looks = _ranked(stage, visible)
-        first = first or ranked
+        ranked, looks = _ranked(stage, visible, given if not stage.accepted else None)
         if not ranked or ranked[0].gain < evidence_threshold(looks):
             break
-        stage = _with(stage, ranked[0])
-    return _outcome(stage, origin, nominal, rig, first)
+        step = _with(stage, ranked[0])
+        if not _confirmed(stage, step):
+            refused = ranked[0]
+            break
+        first, stage = first or ranked, step
+    return _outcome(stage, origin, given, nominal, rig, first, refused)
 
 
 def _experiment(
@@ -147,14 +156,27 @@ def _tightened(parameters: Parameters, known: SpectralFit) -> Parameters:
     return replace(parameters, widths=np.maximum(parameters.widths * np.minimum(spread, 1.0), 1e-3))
 
 
-def _ranked(stage: Stage, effects: Mapping[str, type[Effect]]) -> tuple[list[Candidate | FoundTone], int]:
+def _confirmed(before: Stage, after: Stage) -> bool:
+    """Whether data that no fit has seen are no less likely with the last cause than without."""
+    deviances = []
+    for stage in (before, after):
+        held_out = stage.experiment.held_out(stage.likelihood)
+        deviances.append(held_out.deviance(_predicted(held_out, stage.fit)))
+    return bool(deviances[1] < deviances[0] + DOUBT)
+
+
+def _ranked(
+    stage: Stage, effects: Mapping[str, type[Effect]], given: SpectralFit | None
+) -> tuple[list[Candidate | FoundTone], int]:
     """Candidates for one more cause, best first, and how many were looked at."""
+    far = given is not None and np.max(np.abs(stage.fit.theta)) > FAR
+    anchors = [given] if given is not None and far else []
     steady = {
         name: kind
         for name, kind in effects.items()
         if name not in ("stiffness_drift", "unmeasured_force", "line_hum")
     }
-    candidates, looks = search(stage.likelihood, stage.fit, steady)
+    candidates, looks = search(stage.likelihood, stage.fit, steady, anchors=anchors)
     tones, places = stage.experiment.tones(stage.likelihood, stage.fit, effects)
     parts = stage.experiment.in_parts(stage.likelihood) if "stiffness_drift" in effects else None
     drifts, springs = ([], 0) if parts is None else drifting(parts, stage.fit, effects["stiffness_drift"])
@@ -213,14 +235,19 @@ def _state(stage: Stage, accepted: tuple[Candidate, ...]) -> State:
 
 
 def _outcome(
-    stage: Stage, origin: Stage, nominal: Rig, rig: Rig, first: list[Candidate | FoundTone]
+    stage: Stage,
+    origin: Stage,
+    given: SpectralFit,
+    nominal: Rig,
+    rig: Rig,
+    first: list[Candidate | FoundTone],
+    refused: Candidate | FoundTone | None,
 ) -> Diagnosis:
     named = _named(stage)
     extended = calibrated_rig(stage.likelihood, stage.fit.theta, rig)
     for c, effect, _ in named:
         if isinstance(c, FoundTone) or c.direction is None:
             extended = effect.apply(extended)
-    given = _as_given(origin.likelihood, origin.fit)
     kept = origin.experiment.held_out(origin.likelihood)
     clean = stage.experiment.held_out(stage.likelihood)
     predicted = (_predicted(kept, given), _predicted(kept, origin.fit), _predicted(clean, stage.fit))
@@ -238,6 +265,11 @@ def _outcome(
     ]
     warnings = stage.experiment.warnings(stage.likelihood, origin.likelihood)
     left = stage.experiment.left(stage.likelihood, _predicted(stage.likelihood, stage.fit))
+    if refused is not None and not left:
+        left = (
+            f"something is left: the training data speak for {refused.cause} at {refused.location} (log evidence "
+            f"{0.5 * refused.gain:.3g}), and the data kept aside against it"
+        )
     return Diagnosis(
         UNEXPLAINED if left else EXPLAINED if findings else CONSISTENT,
         tuple(sorted(findings, key=lambda f: -f.holdout_gain)),

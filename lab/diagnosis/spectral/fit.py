@@ -113,7 +113,7 @@ def fit(
     now = point(likelihood, np.asarray(theta, dtype=float), causes, nuisance)
     damping = 1e-3
     for _ in range(iterations):
-        g, H = _system(likelihood, now)
+        g, H = system(likelihood, now, slopes(likelihood, now), whitened_error(likelihood, now))
         if not (np.all(np.isfinite(H)) and np.all(np.isfinite(g))):
             break
         gained = 0.0
@@ -126,7 +126,7 @@ def fit(
             damping = max(damping, 1e-4) * 10
         if gained < tolerance:
             break
-    _, H = _system(likelihood, now)
+    _, H = system(likelihood, now, slopes(likelihood, now), whitened_error(likelihood, now))
     n = now.theta.size
     H[:n, :n] -= likelihood.parameters.precision
     residual = whitened_error(likelihood, now)[None]
@@ -139,16 +139,14 @@ MOST = 8.0
 """Longest step of a variable: in widths of the prior, scales of a cause, or logarithms of power."""
 
 
-def _system(likelihood: Likelihood, now: Point) -> tuple[Array, Array]:
-    """Half the gradient, and information, all with the priors."""
-    J = slopes(likelihood, now)
-    error = whitened_error(likelihood, now)
-    n, size = now.theta.size, len(J)
-    last = size - now.nuisance.size
+def system(likelihood: Likelihood, at: Point, J: Array, error: Array) -> tuple[Array, Array]:
+    """Half the gradient of -2 log posterior, and the information, both with the priors."""
+    n, size = at.theta.size, len(J)
+    last = size - at.nuisance.size
     prior = np.zeros((size, size))
     prior[:n, :n] = likelihood.parameters.precision
     prior[range(last, size), range(last, size)] = likelihood.nuisance_width**-2.0
-    off = np.concatenate([now.theta, np.zeros(last - n), now.nuisance - likelihood.nuisance_mean])
+    off = np.concatenate([at.theta, np.zeros(last - n), at.nuisance - likelihood.nuisance_mean])
     return J @ error + prior @ off, J @ J.T + prior
 
 

@@ -19,6 +19,8 @@ TAPER = 0.05
 """Share of a piece over which a cosine rises at its start and falls at its end (Bendat and Piersol 2010, 11.5.2)."""
 WIDTH = 0.5
 """Width of a band in half bandwidths of the nearest resonance."""
+SHARPEST = 0.02
+"""Damping ratio that bands resolve in any case: what the model leaves out may be sharper than all it has."""
 FIRST = 3
 """Lowest line used: below, the offset of a sensor leaks in."""
 SHORTEST = 64
@@ -85,7 +87,7 @@ def half_bandwidth(plant: Plant, frequency_hz: np.ndarray) -> Array:
     at, half = np.abs(poles) / (2 * np.pi), -poles.real / (2 * np.pi)
     ratio = np.maximum(frequency_hz[:, None] / at, at / np.maximum(frequency_hz[:, None], 1e-300))
     near = half + 0.2 * np.abs(frequency_hz[:, None] - at)
-    return np.min(np.minimum(half * ratio**2, near), axis=1)
+    return np.asarray(np.min(np.minimum(half * ratio**2, near), axis=1))
 
 
 def bands_for(plant: Plant, length: int, dt: float, *, band: tuple[float, float] | None = None) -> Bands:
@@ -109,7 +111,8 @@ def bands_for(plant: Plant, length: int, dt: float, *, band: tuple[float, float]
             f"no line of {length} samples at {1 / dt:.6g} Hz lies between {low:g} and {high:g} Hz; "
             "widen the band or record longer"
         )
-    widths = np.maximum(1, np.floor(WIDTH * half_bandwidth(plant, lines * spacing) / spacing))
+    half = np.minimum(half_bandwidth(plant, lines * spacing), SHARPEST * lines * spacing)
+    widths = np.maximum(1, np.floor(WIDTH * half / spacing))
     firsts, line = [], int(lines[0])
     while line <= lines[-1]:
         firsts.append(line)

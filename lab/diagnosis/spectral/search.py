@@ -13,15 +13,17 @@ from lab.diagnosis.evidence import minus_two_log_evidence
 from lab.diagnosis.fit import POOL
 from lab.diagnosis.misfit import Hypothesis
 from lab.diagnosis.search import Candidate, hypotheses, wrong_parameters
-from lab.diagnosis.spectral.fit import Point, SpectralFit, fit, point, slopes, whitened_error
+from lab.diagnosis.spectral.fit import Point, SpectralFit, fit, point, slopes, system, whitened_error
 from lab.diagnosis.spectral.likelihood import Likelihood
 from lab.effects.effect import Effect
 
-REFITTED, PER_CAUSE, POLISHED = 9, 2, 3
+REFITTED, PER_CAUSE, POLISHED = 7, 2, 3
 NEUTRAL = 1e-9
 """Relative change of the prediction below which a guess counts as no effect at all."""
 WORTH = -5.0
 """Score below which a refit is not worth its time: chance scores lower than the price of a variable."""
+HOPELESS = -20.0
+"""Gain after a rough refit below which no polish helps."""
 STRENGTH = {"attached_oscillator": ("mass", 1), "sensor_delay": ("delay", 1), "sensor_lag": ("corner_hz", -1)}
 """For causes whose guesses have an effect: the variable that scales it, and which way."""
 
@@ -34,22 +36,22 @@ class Screened:
     score: float
 
 
-def screen(likelihood: Likelihood, present: SpectralFit, proposed: Sequence[Hypothesis]) -> list[Screened]:
-    """Hypotheses by falling score: -2 log likelihood that a linear step gains, all else projected out, less its price."""
-    at = point(likelihood, present.theta, present.causes, present.nuisance)
+def screen(likelihood: Likelihood, anchor: SpectralFit, proposed: Sequence[Hypothesis]) -> list[Screened]:
+    """Hypotheses by falling score: -2 log posterior that a linear step gains, all else projected out, less its price."""
+    at = point(likelihood, anchor.theta, anchor.causes, anchor.nuisance)
     J = slopes(likelihood, at)
     error = whitened_error(likelihood, at)
-    H = np.linalg.pinv(present.information + _padded(present.precision, len(J)), rcond=1e-13, hermitian=True)
-    # At the optimum the gradient with the priors is zero, so the error need not be projected.
+    gradient, information = system(likelihood, at, J, error)
+    H = np.linalg.pinv(information, rcond=1e-13, hermitian=True)
     price = float(np.log(error.size))
 
     def score(h: Hypothesis) -> Screened:
-        rows = _directions(likelihood, at, h)
+        rows, deviance = _directions(likelihood, at, h)
         if not rows.size or not np.all(np.isfinite(rows)):
             return Screened(h, -np.inf)
         cross = rows @ J.T
         G = rows @ rows.T - cross @ H @ cross.T
-        g = rows @ error
+        g = rows @ error - cross @ H @ gradient
         scale = np.sqrt(np.maximum(np.diag(rows @ rows.T), 1e-300))
         values, vectors = np.linalg.eigh(G / np.outer(scale, scale))
         seen = values > 1e-8
@@ -57,36 +59,48 @@ def screen(likelihood: Likelihood, present: SpectralFit, proposed: Sequence[Hypo
         if h.kind.cause in STRENGTH:
             step = float(-g[0] / max(G[0, 0], 1e-300))
             h, gain = _scaled(h, float(np.clip(step, 0.02, 3.0))), gain if step > 0 else 0.0
+        if not h.n and deviance - anchor.deviance > gain:
+            # Cables are exchanged or not: what makes things far worse as it stands is no small step away.
+            return Screened(h, -np.inf)
         return Screened(h, gain - max(h.n, 1) * price)
 
     return sorted(POOL.map(score, proposed), key=lambda s: -s.score)
 
 
 def search(
-    likelihood: Likelihood, present: SpectralFit, effects: Mapping[str, type[Effect]]
+    likelihood: Likelihood,
+    present: SpectralFit,
+    effects: Mapping[str, type[Effect]],
+    *,
+    anchors: Sequence[SpectralFit] = (),
 ) -> tuple[list[Candidate], int]:
-    """Candidates for one more cause beside those present, best first, and how many were looked at."""
+    """Candidates for one more cause beside those present, best first, and how many were looked at.
+
+    Args:
+        likelihood: model and data.
+        present: the fit to be improved.
+        effects: causes that may be named.
+        anchors: other points with the same causes from which to look, such as the model as given: a calibration that took
+            pains to explain a cause it does not have is a bad place to see it from.
+    """
     taken = {(cause.kind, cause.location) for cause in present.causes}
     if any(cause.kind.cause == "attached_oscillator" for cause in present.causes):
         # One more degree of freedom is all that a twin can grow.
         effects = {name: kind for name, kind in effects.items() if name != "attached_oscillator"}
     proposed = [h for h in hypotheses(likelihood, effects) if (h.kind, h.location) not in taken]  # type: ignore[arg-type]
-    picked: list[Hypothesis] = []
-    for row in screen(likelihood, present, proposed):
-        h = row.hypothesis
-        same = [other for other in picked if other.kind is h.kind]
-        known = any(other.location == h.location for other in same)
-        if not known and len(same) < PER_CAUSE and len(picked) < REFITTED and row.score > WORTH:
-            picked.append(h)
+    picked = [(present, h) for h in _best(screen(likelihood, present, proposed))]
+    for anchor in anchors:
+        picked += [(anchor, h) for h in _best(screen(likelihood, anchor, proposed))]
     without = _cost(present)
     candidates = wrong_parameters(likelihood, present, without, effects)  # type: ignore[arg-type]
     looks = len(proposed) + len(candidates)
-    rough = [refitted(likelihood, present, h, iterations=6, tolerance=3.0) for h in picked]
+    rough = [refitted(likelihood, anchor, h, iterations=6, tolerance=3.0) for anchor, h in picked]
     scored = sorted((candidate(f, without) for f in rough if f is not None), key=lambda c: -c.gain)
-    for old in scored[:POLISHED]:
+    for old in [c for c in scored[:POLISHED] if c.gain > HOPELESS]:
         f = fit(likelihood, old.fit.theta, old.fit.causes, old.fit.nuisance)  # type: ignore[attr-defined]
         candidates.append(max(old, candidate(f, without), key=lambda c: c.gain))
-    return sorted(candidates + scored[POLISHED:], key=lambda c: -c.gain), looks
+    candidates += [c for k, c in enumerate(scored) if k >= POLISHED or c.gain <= HOPELESS]
+    return _once(sorted(candidates, key=lambda c: -c.gain)), looks
 
 
 def drifting(parts: Likelihood, present: SpectralFit, kind: type[Effect]) -> tuple[list[Candidate], int]:
@@ -139,21 +153,25 @@ def _cost(found: SpectralFit) -> float:
     return minus_two_log_evidence(found)  # type: ignore[arg-type]
 
 
-def _directions(likelihood: Likelihood, at: Point, h: Hypothesis) -> Array:
-    """Whitened changes of the prediction that a hypothesis offers: its whole effect, or its slopes where it starts at none."""
+def _directions(likelihood: Likelihood, at: Point, h: Hypothesis) -> tuple[Array, float]:
+    """Whitened changes of the prediction that a hypothesis offers, and the deviance where it starts.
+
+    They are its slopes where it starts at no effect, else that effect as a whole.
+    """
     predicted = likelihood.predict(at.theta, [*at.causes, h], at.nuisance)
     if not np.all(np.isfinite(predicted)):
-        return np.zeros((0, 0))
+        return np.zeros((0, 0)), np.inf
     change = predicted - at.predicted
     if np.max(np.abs(change)) > NEUTRAL * np.max(np.abs(at.predicted)):
-        return likelihood.whitened(at.predicted, change[None])
+        deviance = likelihood.deviance(predicted) if not h.n else np.inf
+        return likelihood.whitened(at.predicted, change[None]), deviance
     rows = []
     for j in range(h.n):
         step = np.zeros(h.n)
         step[j] = 1e-3
         moved = likelihood.predict(at.theta, [*at.causes, h.at(h.values + step)], at.nuisance)
         rows.append((moved - predicted) / 1e-3)
-    return likelihood.whitened(at.predicted, np.stack(rows)) if rows else np.zeros((0, 0))
+    return (likelihood.whitened(at.predicted, np.stack(rows)) if rows else np.zeros((0, 0))), np.inf
 
 
 def _scaled(h: Hypothesis, step: float) -> Hypothesis:
@@ -164,6 +182,21 @@ def _scaled(h: Hypothesis, step: float) -> Hypothesis:
     return h.at(values)
 
 
-def _padded(precision: Array, size: int) -> Array:
-    n = len(precision)
-    return np.pad(precision, ((0, size - n), (0, size - n)))
+def _best(rows: Sequence[Screened]) -> list[Hypothesis]:
+    """The hypotheses worth a refit, few of each cause."""
+    picked: list[Hypothesis] = []
+    for row in rows:
+        h = row.hypothesis
+        same = [other for other in picked if other.kind is h.kind]
+        known = any(other.location == h.location for other in same)
+        if not known and len(same) < PER_CAUSE and len(picked) < REFITTED and row.score > WORTH:
+            picked.append(h)
+    return picked
+
+
+def _once(candidates: Sequence[Candidate]) -> list[Candidate]:
+    """The best of every cause and place, in their order."""
+    first: dict[tuple[str, str], Candidate] = {}
+    for c in candidates:
+        first.setdefault((c.cause, c.location), c)
+    return list(first.values())

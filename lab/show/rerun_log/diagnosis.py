@@ -28,7 +28,8 @@ from lab.show.rerun_log.scene import (
     motion_frames,
     view,
 )
-from lab.show.residuals import relative_errors, residual, shown_models
+from lab.show.rerun_log.spectra import log_spectra
+from lab.show.residuals import relative_errors, residual, shown_models, worst_rows
 from lab.show.signals import envelope
 
 if TYPE_CHECKING:
@@ -71,6 +72,12 @@ def write_diagnosis_rrd(
         text = _summary(title, diagnosis, recording)
         stream.log("summary", rr.TextDocument(text, media_type=PLAIN), static=True)
         models = shown_models(diagnosis)
+        summary = rrb.TextDocumentView(origin="/summary", name="Summary")
+        if diagnosis.spectra is not None:
+            plots = log_spectra(stream, diagnosis.spectra, worst_rows(diagnosis.spectra), models)
+            tab = rrb.Horizontal(summary, rrb.Vertical(*plots), column_shares=[2, 3], name="Spectra")
+            stream.send_blueprint(rrb.Blueprint(rrb.Tabs(tab), rrb.TimePanel(state="hidden")))
+            return
         errors = relative_errors(diagnosis, "calibrated")
         rows = sorted(int(row) for row in np.argsort(-errors, kind="stable")[:MAX_CHANNELS])
         predicted = [
@@ -96,7 +103,6 @@ def write_diagnosis_rrd(
             )
             for row in rows
         ]
-        summary = rrb.TextDocumentView(origin="/summary", name="Summary")
         tabs: list[rrb.Container] = [
             rrb.Horizontal(
                 summary, rrb.Vertical(*predicted), column_shares=[2, 3], name="Measured and predicted"
