@@ -7,6 +7,8 @@ import scipy.fft
 
 from identification.peaks import find_peaks
 from identification.recording import Array
+from lab.checks.hum import hum
+from lab.checks.lines import folded
 from lab.checks.remark import Remark
 from lab.checks.survey import Sheet, Survey
 
@@ -72,8 +74,14 @@ def _resonances(survey: Survey, sheet: Sheet) -> list[float]:
         return [float(each) for each in modes.frequency_hz[seen]]
     total = power.sum(axis=1, keepdims=True)
     mean = np.sum(np.divide(power, total, out=np.zeros_like(power), where=total > 0), axis=0)
+    humming = {remark.evidence["frequency_hz"] for remark in hum(survey)}
     tops = [peak.top for peak in find_peaks(mean[2:], RISE)]
-    return [float(f[k + 2]) for k in tops if mean[k + 2] > 1e-2 * np.max(mean)]
+    return [
+        float(f[k + 2])
+        for k in tops
+        if not any(abs(f[k + 2] - folded(line, sheet.sample_rate)) < 2 * f[1] for line in humming)
+        and mean[k + 2] > 1e-2 * np.max(mean)
+    ]
 
 
 def _level(sheet: Sheet, drive: Array, frequency_hz: float) -> float:

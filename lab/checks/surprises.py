@@ -5,8 +5,9 @@ from __future__ import annotations
 from lab.checks.outliers import Outlier
 from lab.checks.survey import Sheet
 
-CERTAIN = 8.0
-"""Ratio of a surprise that a Gaussian channel shows once in 10^14 samples, so that a scale 20 % off does no harm."""
+CERTAIN = 7.0
+"""Ratio of a surprise that a Gaussian channel shows once in 10^11 samples: with a scale 10 % off, still less than one
+channel in 1000 of a million samples."""
 
 BLOWS = ("pulse", "impact")
 NEAR = 4
