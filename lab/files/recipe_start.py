@@ -57,7 +57,9 @@ def _channel(source: Source, name: str) -> list[str]:
     unit = source.units.get(name, OPEN)
     side = source.sides.get(name) or ("input" if _is_force(unit) else "output")
     sure = "" if source.sides.get(name) else '  # or "inputs", or leave the channel out'
-    return ["", f"[[{side}s]]{sure}", f"name = {_quoted(name)}", f"unit = {_quoted(unit)}"]
+    # A unit of the recipe would replace that of the file, whose numbers may be converted already.
+    last = f"# in {unit}, as the file states" if name in source.units else f"unit = {_quoted(OPEN)}"
+    return ["", f"[[{side}s]]{sure}", f"name = {_quoted(name)}", last]
 
 
 def _responses(source: Source, frequency: str) -> list[str]:

@@ -109,6 +109,9 @@ def _name(each: Mapping[str, Any], own: bool) -> str:
     if own:
         return _text(each, "id1")
     label = label_of(each, "rsp")
+    if label == "0":
+        # No point at all: loggers name the channel on the first ID line.
+        return _text(each, "id1") or "NONE"
     what = SPECIFIC.get(each["ordinate_spec_data_type"], ("",))[0]
     return f"{what} {label}".strip()
 
@@ -119,6 +122,10 @@ def _grouped(signals: Sequence[Mapping[str, Any]], own: bool) -> list[list[Mappi
     seen: set[tuple[str, str]] = set()
     for each in signals:
         key = (_name(each, own), _text(each, "id2") if own else "")
+        if key in seen and not own and label_of(each, "rsp") == "0":
+            raise FileError(
+                f"holds several signals {key[0]!r} without point; nothing tells channels from records"
+            )
         if not groups or key in seen:
             groups.append([])
             seen = set()

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
@@ -106,7 +107,7 @@ def unit_of(
 
 
 def _known(label: str) -> tuple[str, float] | None:
-    text = label.strip().strip("[]()").strip()
+    text = re.sub(r"^[\[(]([^\[\]()]*)[\])]$", r"\1", label.strip()).strip()
     if not text or text.upper() in ("NONE", "UNKNOWN", "?"):
         return None
     return to_si(text)

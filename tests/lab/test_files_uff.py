@@ -128,12 +128,24 @@ def test_a_channel_that_comes_again_begins_the_next_record(tmp_path):
     assert len(found.records) == 3
 
 
+def test_signals_without_a_point_go_by_their_id_line(tmp_path):
+    about = {"node": 0, "direction": 0, "binary": "<"}
+    sets = [universal.function(SIGNAL * k, TIME, ids=(f"acc {k}", *("NONE",) * 4), **about) for k in (1, 2)]
+    found = read_foreign(written(tmp_path, *sets)).recording
+    assert [channel.name for channel in found.outputs] == ["acc 1", "acc 2"]
+    assert len(found.records) == 1
+    nameless = universal.function(SIGNAL, TIME, **about)
+    with pytest.raises(FileError, match="without point"):
+        read_foreign(written(tmp_path, nameless, nameless))
+
+
 def test_the_starting_recipe_names_the_channels(tmp_path):
-    path = written(tmp_path, universal.function(SIGNAL, TIME, type=0, entity="top"))
+    path = written(tmp_path, universal.function(SIGNAL, TIME, type=0, entity="top", label="g", binary="<"))
     with pytest.raises(AmbiguousFileError) as raised:
         read_foreign(path)
-    recipe = raised.value.recipe.replace('"?"', '"m/s^2"')
-    assert read_foreign(path, parse_recipe(recipe)).recording.outputs[0].unit == "m/s^2"
+    found = read_foreign(path, parse_recipe(raised.value.recipe)).recording
+    # The unit stays that of the file, which must not be taken twice.
+    np.testing.assert_allclose(found.records[0].outputs[0], SIGNAL * 9.80665, rtol=1e-15)
 
 
 def test_a_step_of_six_digits_takes_the_better_rate_and_refuses_another(tmp_path):
