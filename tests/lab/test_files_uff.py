@@ -224,6 +224,30 @@ def test_padding_is_cut_and_other_functions_are_named(tmp_path):
     assert any("type 2 left out" in note for note in found.notes)
 
 
+def test_line_ends_of_other_systems_are_read(tmp_path):
+    text = pair().replace(b"\n", b"\r\n")
+    binary = universal.function(SIGNAL, TIME, binary="<")
+    # Some programs end the binary numbers with a line break.
+    broken = binary[: -len(b"    -1\n")] + b"\r\n    -1\r\n"
+    for content, tolerance in ((text, TWELVE), (broken, 0)):
+        found = read_foreign(written(tmp_path, content)).recording
+        np.testing.assert_allclose(found.records[0].outputs[0], SIGNAL, rtol=tolerance)
+
+
+def test_real_shapes_with_rotations_have_rotations_in_radians(tmp_path):
+    text = universal.mode(1, {3: [1.0, 0, 0]}, kind=8, frequency=2.0).decode()
+    values = "".join(f"{value:13.5e}" for value in (1.0, 0.0, 0.0, 0.0, 0.5, 0.0))
+    lines = text.splitlines()
+    lines[7], lines[-2] = lines[7][:-1] + "6", values
+    system = universal.units(1e3, 1.0)
+    modes = read_foreign(written(tmp_path, system, ("\n".join(lines) + "\n").encode())).modes
+    assert [(c.name, c.unit) for c in modes.outputs] == [
+        ("displacement 3+X", "m"),
+        ("displacement 3+RY", "rad"),
+    ]
+    np.testing.assert_allclose(modes.shapes[:, 0], [1e-3, 0.5], rtol=1e-12)
+
+
 WHOLE = universal.function(SIGNAL, TIME)
 
 
