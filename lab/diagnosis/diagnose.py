@@ -28,8 +28,8 @@ from lab.diagnosis.outcome import (
     Quantity,
 )
 from lab.diagnosis.search import Candidate, search, wrong_parameters
-from lab.diagnosis.unlearnable import unlearnable
 from lab.diagnosis.starts import best_starts, free_decays, starts_of, with_starts
+from lab.diagnosis.unlearnable import unlearnable
 from lab.diagnosis.whiteness import Whiteness, whiteness
 from lab.effects import EFFECTS
 from lab.effects.damping_change import DampingChange
@@ -148,9 +148,7 @@ def evidence_threshold(looks: int) -> float:
 
 def _connected(rig: Rig, recording: Recording) -> Rig:
     """The rig with the recording's channels."""
-    blind = [
-        i for i, r in enumerate(recording.records) if not r.inputs.shape[0] and r.kind != "free_decay"
-    ]
+    blind = [i for i, r in enumerate(recording.records) if not r.inputs.shape[0] and r.kind != "free_decay"]
     if blind:
         raise LabError(
             f"record {blind[0]} has no measured input and is {recording.records[blind[0]].kind!r}; expected measured forces or "
@@ -321,10 +319,12 @@ def _outcome(
     if not left.passed:
         verdict = UNEXPLAINED
         warnings.append(words.left_over(left, recording))
+    alternatives = _alternatives(first) if findings else ()
+    warnings += words.inseparable(alternatives)
     return Diagnosis(
         verdict,
         tuple(sorted(findings, key=lambda f: -f.holdout_gain)),
-        _alternatives(first) if findings else (),
+        alternatives,
         calibration_of(state),
         errors_of(predictions, floor),
         predictions,

@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 
 from identification.recording import Recording
-from lab.diagnosis.outcome import Quantity
+from lab.diagnosis.outcome import Alternative, Quantity
 from lab.diagnosis.whiteness import Whiteness
 from lab.effects.effect import EVERYWHERE, Effect
 
@@ -53,6 +53,16 @@ def advice(told: str, other: str, gap: float) -> str:
         frozenset({told, other}), "repeat the test with another input, level or one more sensor"
     )
     return f"these data cannot separate it from {told.replace('_', ' ')}: {measurement}"
+
+
+def inseparable(alternatives: Sequence[Alternative]) -> list[str]:
+    """A warning for each alternative that the data hardly tell from the first finding."""
+    return [
+        f"{other.cause.replace('_', ' ')} at {other.location.replace('|', ' and ')} would explain the first finding about as "
+        f"well: {other.advice}"
+        for other in alternatives
+        if other.advice
+    ]
 
 
 def left_over(left: Whiteness, recording: Recording) -> str:
