@@ -140,7 +140,7 @@ def test_an_input_that_drives_only_low_resonances_is_noticed():
     poles = np.exp((-0.01 + 1j) * np.array([0.05, 1.5]))
     y = sum(
         np.real(_filtered(p, force))
-        for p, force in zip(poles, (u, 0.5 * rng.standard_normal(u.size)), strict=True)
+        for p, force in zip(poles, (u, 100.0 * rng.standard_normal(u.size)), strict=True)
     )
     made = Recording(
         (Record("random", u[None], y[None]),), (Channel("f", "N"),), (Channel("a", "m/s^2"),), RATE
