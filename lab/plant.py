@@ -182,11 +182,12 @@ def ready(plant: Plant, dt: float, *, substeps: int = 6) -> Responder:
     sub = substeps if plant.laws else 1
     rows = np.array([law.row for law in plant.laws]).reshape(-1, n)
     tones = np.array([tone.row for tone in plant.tones]).reshape(-1, n)
-    solve = scipy.linalg.cho_factor(plant.mass)
     # Accelerations from displacement, velocity, inputs, tones and laws.
-    from_q, from_v, from_u, from_t, from_g = (
-        scipy.linalg.cho_solve(solve, X)
-        for X in (-plant.stiffness, -plant.damping, plant.forces, tones.T, -rows.T)
+    forces = (-plant.stiffness, -plant.damping, plant.forces, tones.T, -rows.T)
+    from_q, from_v, from_u, from_t, from_g = np.split(
+        np.linalg.solve(plant.mass, np.hstack(forces)),
+        np.cumsum([force.shape[1] for force in forces])[:-1],
+        axis=1,
     )
     lagging_in = [i for i, path in enumerate(plant.input_paths) if path.lag]
     lagging_out = [i for i, path in enumerate(plant.output_paths) if path.lag]
@@ -214,8 +215,9 @@ def ready(plant: Plant, dt: float, *, substeps: int = 6) -> Responder:
         A[slot, slot] -= rate
         C[i], D[i], E[i] = np.eye(b)[slot], 0.0, 0.0
     changes = {n_in + j: (i, plant.input_paths[i].parts(dt)[1] * dt) for j, i in enumerate(late)}
-    F, _, P, Q = _over_a_substep(A, B, W, dt / sub)
-    G = np.stack([_inputs_over(A, B, k * dt / sub, dt / sub, changes) for k in range(sub)])
+    F, held, P, Q = _over_a_substep(A, B, W, dt / sub)
+    starts = np.arange(sub) * dt / sub
+    G = np.stack([_inputs_over(A, B, t, dt / sub, changes) if changes else held for t in starts])
     dry = [i for i, law in enumerate(plant.laws) if law.kind == COULOMB and not law.parameters[1]]
     Q[:, dry] += P[:, dry]
     P[:, dry] = 0.0

@@ -17,7 +17,12 @@ from lab.effects.effect import EVERYWHERE, Effect
 
 OWN_PARAMETERS = {"mass": "mass_change", "stiffness": "stiffness_change", "damping": "damping_change"}
 SCREEN_SAMPLES = 4096
+STEPPED_ON = 40
+"""Hypotheses that get more than one step in the screening."""
 REFITTED, PER_CAUSE, POLISHED = 10, 2, 3
+KEPT = 5
+"""Candidates kept after each stage of their refits, besides those that are as good within `CLOSE`."""
+CLOSE = 30.0
 NEGLIGIBLE = 1e-3
 """Unknown force, as a share of the inertia forces, that nobody would miss in a model."""
 
@@ -41,6 +46,10 @@ class Candidate:
     gain: float
     direction: Array | None = None
     guided: Fit | None = None
+
+
+_Start = tuple[Hypothesis, Array, Array, float, float]
+"""A hypothesis, its residual, what is left of it with the model's parameters projected out, objective, damping."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -94,12 +103,10 @@ def screen(
         left = r + np.tensordot(d, slopes, axes=1)
         return left, objective(left, theta + d[:n], P)
 
-    def score(hypothesis: Hypothesis) -> Screened:
-        h = hypothesis
-        r = misfit.residual(theta, [*present, h], observer=observer, n_train=n_train)
-        left, f = projected(r)
-        damping = 1e-2
-        for _ in range(4 if h.n else 0):
+    def advanced(started: _Start, steps: int) -> _Start:
+        """A start after a few Gauss-Newton steps on its own variables."""
+        h, r, left, f, damping = started
+        for _ in range(steps if h.n else 0):
             if not np.isfinite(f):
                 break
             own = cause_slopes(misfit, theta, [*present, h], observer, r, n_train)[-h.n :]
@@ -129,9 +136,21 @@ def screen(
             h, r, left, f, damping = trial, trial_r, trial_left, trial_f, damping / 5
             if gained < 1:
                 break
-        return Screened(h, base - f - max(h.n, 1) * float(np.log(e.size)))
+        return h, r, left, f, damping
 
-    return sorted(POOL.map(score, proposed), key=lambda s: -s.score if np.isfinite(s.score) else np.inf)
+    def start(h: Hypothesis) -> _Start:
+        r = misfit.residual(theta, [*present, h], observer=observer, n_train=n_train)
+        return h, r, *projected(r), 1e-2
+
+    def screened(started: _Start) -> Screened:
+        h, f = started[0], started[3]
+        score = base - f - max(h.n, 1) * float(np.log(e.size))
+        return Screened(h, score if np.isfinite(score) else -np.inf)
+
+    first = list(POOL.map(lambda h: screened(advanced(start(h), 1)), proposed))
+    first.sort(key=lambda s: -s.score)
+    again = list(POOL.map(lambda s: screened(advanced(start(s.hypothesis), 3)), first[:STEPPED_ON]))
+    return sorted(again + first[STEPPED_ON:], key=lambda s: -s.score)
 
 
 def search(
@@ -158,32 +177,65 @@ def search(
             picked.append(h)
             places.add(key)
     without = minus_two_log_evidence(present)
-    refits = [_refit(calibration, theta, present, h) for h in picked]
-    scored = sorted((_candidate(f, g, without) for f, g in filter(None, refits)), key=lambda c: -c.gain)
+    refits = _refitted(calibration, theta, present, picked)
+    scored = sorted((_candidate(f, g, without) for f, g in refits), key=lambda c: -c.gain)
     best = [_polished(misfit, c, without) for c in scored[:POLISHED]] + scored[POLISHED:]
     candidates = wrong_parameters(misfit, present, without, effects) + _steadied(calibration, best, without)
     return sorted(candidates, key=lambda c: -c.gain), rows
 
 
-def _refit(
-    calibration: Calibration, theta: Array, present: Fit, h: Hypothesis
-) -> tuple[Fit, Fit | None] | None:
-    """A complete fit with the new cause, trusting the measurements less and less, and the last that trusted them."""
-    misfit, causes = calibration.misfit, (*present.causes, h)
+def _refitted(
+    calibration: Calibration, theta: Array, present: Fit, picked: Sequence[Hypothesis]
+) -> list[tuple[Fit, Fit | None]]:
+    """Complete fits with each new cause, trusting the measurements less and less; the hopeless are dropped on the way.
+
+    Beside each fit stands the last one that trusted the measurements.
+    """
+    misfit = calibration.misfit
     shares = (
         [] if present.causes else [s for s in (calibration.share, calibration.share / 10) if s > NEGLIGIBLE]
     )
-    guided = None
+    running: list[tuple[Array, tuple[Hypothesis, ...], Fit | None]] = [
+        (theta, (*present.causes, h), None) for h in picked
+    ]
+    for share in shares:
+        led = [
+            _tried(misfit, theta, causes, kalman_gain(misfit, theta, share), iterations=3, tolerance=20)
+            for theta, causes, _ in running
+        ]
+        running = [(f.theta, f.causes, f) for f in _leading([f for f in led if f is not None])]
+    first = [
+        (_tried(misfit, theta, causes, present.observer, iterations=2, tolerance=1), guided)
+        for theta, causes, guided in running
+    ]
+    plain = {id(f): guided for f, guided in first if f is not None}
+    kept = _leading([f for f, _ in first if f is not None])
+    found = [(_tried(misfit, f.theta, f.causes, present.observer, iterations=6), plain[id(f)]) for f in kept]
+    return [(f, guided) for f, guided in found if f is not None]
+
+
+def _tried(
+    misfit: Misfit,
+    theta: Array,
+    causes: Sequence[Hypothesis],
+    observer: Array,
+    *,
+    iterations: int,
+    tolerance: float = 0.5,
+) -> Fit | None:
+    """A fit, or nothing where it fails."""
     try:
-        for share in shares:
-            guided = fit(
-                misfit, theta, causes, observer=kalman_gain(misfit, theta, share), iterations=3, tolerance=20
-            )
-            theta, causes = guided.theta, guided.causes
-        found = fit(misfit, theta, causes, observer=present.observer, iterations=8)
+        found = fit(misfit, theta, causes, observer=observer, iterations=iterations, tolerance=tolerance)
     except (np.linalg.LinAlgError, ValueError):
         return None
-    return (found, guided) if np.isfinite(found.objective) else None
+    return found if np.isfinite(found.objective) else None
+
+
+def _leading(fits: Sequence[Fit]) -> list[Fit]:
+    """The best fits, the price of their variables paid."""
+    price = {id(f): f.objective + sum(max(c.n, 1) for c in f.causes) * np.log(f.residual.size) for f in fits}
+    ordered = sorted(fits, key=lambda f: price[id(f)])
+    return [f for i, f in enumerate(ordered) if i < KEPT or price[id(f)] < price[id(ordered[0])] + CLOSE]
 
 
 def _polished(misfit: Misfit, candidate: Candidate, without: float) -> Candidate:
