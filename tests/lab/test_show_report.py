@@ -100,7 +100,7 @@ def test_order_is_verdict_tables_figures_reproduction(page):
         "Modes",
         "Mass, damping, stiffness",
         "Figures",
-        "Notes",
+        "Why this result",
         "Warnings",
         "To reproduce",
     ]
