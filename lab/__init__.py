@@ -3,6 +3,7 @@
     rig = lab.Rig.load("models/chain3_uncoupled.xml")
     recording = lab.simulate(rig, lab.EXCITATIONS["pulse"](), sample_rate=20.0, duration=10.0)
     result = lab.run("scenarios/chain3_pulse.toml", "out/chain3_pulse")
+    diagnosis = lab.diagnose(recording, rig)
 
 Names are imported when first used, so that `import lab` is quick.
 """
@@ -17,6 +18,10 @@ from typing import TYPE_CHECKING, Any
 if TYPE_CHECKING:
     from lab.checks import check
     from lab.compare import compare
+    from lab.diagnose_files import diagnose_file
+    from lab.diagnosis.diagnose import diagnose
+    from lab.diagnosis.outcome import Diagnosis
+    from lab.effects import EFFECTS
     from lab.excitation import EXCITATIONS
     from lab.files.recording import load as load_recording
     from lab.files.recording import save as save_recording
@@ -28,12 +33,16 @@ if TYPE_CHECKING:
     from lab.simulate import simulate
 
 _WHERE = {
+    "Diagnosis": ("lab.diagnosis.outcome", "Diagnosis"),
+    "EFFECTS": ("lab.effects", "EFFECTS"),
     "EXCITATIONS": ("lab.excitation", "EXCITATIONS"),
     "Result": ("lab.result", "Result"),
     "Rig": ("lab.rig", "Rig"),
     "Scenario": ("lab.scenario", "Scenario"),
     "check": ("lab.checks", "check"),
     "compare": ("lab.compare", "compare"),
+    "diagnose": ("lab.diagnosis.diagnose", "diagnose"),
+    "diagnose_file": ("lab.diagnose_files", "diagnose_file"),
     "identify_file": ("lab.run", "identify_file"),
     "instrument": ("lab.instruments", "instrument"),
     "load_recording": ("lab.files.recording", "load"),
@@ -44,12 +53,16 @@ _WHERE = {
 }
 
 __all__ = [
+    "EFFECTS",
     "EXCITATIONS",
+    "Diagnosis",
     "Result",
     "Rig",
     "Scenario",
     "check",
     "compare",
+    "diagnose",
+    "diagnose_file",
     "identify_file",
     "instrument",
     "load_recording",
