@@ -38,6 +38,10 @@ MAX_EVENTS = 500
 """Events told apart in one block of one channel; more of them are not surprises."""
 
 
+MIN_LEVELS = 8
+"""Fewer values than these lie on multiples of a step by chance."""
+
+
 @dataclass(frozen=True)
 class Outlier:
     """One surprise.
@@ -113,7 +117,7 @@ def autoregression(y: Array, order: int = ORDER) -> Array | None:
         n_fft = 1 << (2 * y.size - 1).bit_length()
         r = np.fft.irfft(np.abs(np.fft.rfft(y, n_fft)) ** 2)[: order + 1]
         if not r[0] > 0:
-            return None
+            break  # nothing but wild samples, such as a single blow
         # Rounding of the correlations is the least noise that an autoregression can know of.
         r[0] *= 1 + 1e-9
         pi = np.concatenate([[1.0], -scipy.linalg.solve_toeplitz(r[:-1], r[1:])])
@@ -152,7 +156,8 @@ def _in_block(
     known = pi.size - 1
     e[:known] = 0.0
     # Rounding to steps leaves a residual of this size, even where the channel stands still.
-    floor = max(levels.step[row] * np.linalg.norm(pi) / np.sqrt(12), 1e-7 * levels.rms[row])
+    step = levels.step[row] if levels.n_values[row] >= MIN_LEVELS else 0.0
+    floor = max(step * np.linalg.norm(pi) / np.sqrt(12), 1e-7 * levels.rms[row])
     s = np.maximum(_scale(e), floor)
     wild = np.flatnonzero(np.abs(e) > SURPRISE * s)
     if wild.size > MAX_EVENTS:

@@ -18,7 +18,7 @@ def told(recording, rig):
 
 
 @pytest.mark.parametrize("kind", ["random", "ambient", "pulse", "free_decay"])
-@pytest.mark.parametrize("seed", [0, 3])
+@pytest.mark.parametrize("seed", [0, pytest.param(3, marks=pytest.mark.slow)])
 def test_mistakes_are_found_and_nothing_else(kind, seed):
     recording, rig = measured(kind, seed)
     for name, (made, expected) in mistakes(recording, np.random.default_rng(seed)).items():
