@@ -1,7 +1,7 @@
 """Checks: what an experienced technician notices in a recording before any analysis.
 
 `check(recording)` looks at the recording alone, `check(recording, rig)` also holds it against a model. Each check is a
-function of a survey, in a file of its own, and returns remarks; together they look through the data four times.
+function of a survey, in a file of its own, and returns remarks; together they look through the data about five times.
 """
 
 from __future__ import annotations

@@ -58,11 +58,10 @@ class Pairs:
     """Modes of the recording and of the model that belong together.
 
     Attributes:
-        measured: real shapes, one column for each pair, shape (n_pairs, n_outputs) transposed: (n_outputs, n_pairs).
-        modelled: likewise.
-        frequency_hz: measured frequencies, shape (n_pairs,).
-        ratio: median of measured over modelled frequency.
-        scatter: relative spread of the ratios about it.
+        measured_shapes: real, of unit length but for what is out of phase, shape (n_outputs, n_pairs).
+        modelled_shapes: likewise.
+        measured: measured frequencies [Hz], shape (n_pairs,).
+        modelled: frequencies of the model [Hz], likewise.
     """
 
     measured_shapes: Array
