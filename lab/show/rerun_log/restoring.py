@@ -24,11 +24,13 @@ def log_restoring(stream: rr.RecordingStream, restoring: Restoring) -> rrb.View:
     ends = np.array([restoring.law_x.min(), restoring.law_x.max()])
     line = rr.LineStrips2D([axes.at(ends, restoring.linear * ends)], colors=rgb(SERIES[4]), radii=-1.0)
     stream.log(f"{ORIGIN}/linear", line, static=True)
-    for name, points, color, radius in (
-        ("measured", axes.at(restoring.x, restoring.force), GREY, -1.5),
-        ("law", axes.at(restoring.law_x, restoring.law_force), rgb(SERIES[0]), -1.0),
+    # The law lies on the broader dots of the measurements.
+    for name, points, color, radius, order in (
+        ("measured", axes.at(restoring.x, restoring.force), GREY, -3.0, 31.0),
+        ("law", axes.at(restoring.law_x, restoring.law_force), rgb(SERIES[0]), -1.5, 32.0),
     ):
-        stream.log(f"{ORIGIN}/{name}", rr.Points2D(points, colors=color, radii=radius), static=True)
+        dots = rr.Points2D(points, colors=color, radii=radius, draw_order=order)
+        stream.log(f"{ORIGIN}/{name}", dots, static=True)
     keys = ("from the measurements", "the law found", "calibrated, without the finding")
     places = [[axes.width * (0.1 + 0.3 * i), axes.height + 22] for i in range(3)]
     colors = [GREY, rgb(SERIES[0]), rgb(SERIES[4])]
