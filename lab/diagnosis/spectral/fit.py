@@ -117,8 +117,12 @@ def fit(
         if not (np.all(np.isfinite(H)) and np.all(np.isfinite(g))):
             break
         gained = 0.0
+        # A variable without any effect has no scale of its own, and stays.
+        scale = np.sqrt(np.where(np.diag(H) > 0, np.diag(H), 1.0))
         for _ in range(8):
-            step = -np.linalg.solve(H + damping * np.diag(np.diag(H)), g)
+            step = (
+                -np.linalg.solve(H / np.outer(scale, scale) + damping * np.eye(scale.size), g / scale) / scale
+            )
             trial = now.moved(likelihood, np.clip(step, -MOST, MOST))
             if trial.objective < now.objective:
                 gained, now, damping = now.objective - trial.objective, trial, max(damping / 10, 1e-7)
