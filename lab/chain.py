@@ -27,7 +27,7 @@ import scipy.signal
 
 from identification.recording import Array
 from lab.errors import RigError, UnknownNameError
-from lab.filters import held_low_pass, low_pass
+from lab.filters import band_limited_lag, held_low_pass, low_pass
 
 Process = Callable[[Array], Array]
 """Turns the next block of a signal into what leaves the stage; remembers the blocks before."""
@@ -49,6 +49,7 @@ class Stage:
 
     name: ClassVar[str] = ""
     at_samples: ClassVar[bool] = False
+    whole_record: ClassVar[bool] = False
     positive: ClassVar[tuple[str, ...]] = ()
     not_negative: ClassVar[tuple[str, ...]] = ()
     channel: str
@@ -160,6 +161,23 @@ class HeldLag(Stage):
             return np.asarray(y)
 
         return process
+
+
+@dataclass(frozen=True)
+class BandLimitedLag(Stage):
+    """First-order low-pass of corner frequency `corner_hz` on a signal that an ideal anti-alias filter has limited."""
+
+    name: ClassVar[str] = "band_limited_lag"
+    whole_record: ClassVar[bool] = True
+    positive: ClassVar[tuple[str, ...]] = ("corner_hz",)
+    corner_hz: float
+
+    @property
+    def needs_samples(self) -> bool:
+        return True
+
+    def start(self, dt: float, rng: np.random.Generator, rms: float) -> Process:
+        return lambda x: band_limited_lag(x, 1 / (2 * np.pi * self.corner_hz), dt)
 
 
 @dataclass(frozen=True)
@@ -323,7 +341,19 @@ class Dropout(Stage):
 
 STAGES: dict[str, type[Stage]] = {
     stage.name: stage
-    for stage in (Gain, Saturation, Lag, HeldLag, LowPass, Delay, Hum, Noise, Resolution, Dropout)
+    for stage in (
+        Gain,
+        Saturation,
+        Lag,
+        HeldLag,
+        BandLimitedLag,
+        LowPass,
+        Delay,
+        Hum,
+        Noise,
+        Resolution,
+        Dropout,
+    )
 }
 PLACES = {
     "actuators": "input channel",
@@ -365,6 +395,11 @@ class Chain:
         """The chain with stages appended in one place: actuators, sensors, force_sensors or acquisition."""
         changed: dict[str, Any] = {place: (*getattr(self, place), *stages)}
         return dataclasses.replace(self, **changed)
+
+    @property
+    def whole_record(self) -> bool:
+        """Whether a stage must see a record from its start to its end at once."""
+        return any(stage.whole_record for place in PLACES for stage in getattr(self, place))
 
     def check(self, inputs: Sequence[str], outputs: Sequence[str], dofs: Sequence[str]) -> None:
         """Check every name of a channel or degree of freedom against those that exist.

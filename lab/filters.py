@@ -88,3 +88,14 @@ def _phi(x: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     terms = [x**k / math.factorial(k + 2) for k in range(20)]
     two = np.where(np.abs(x) < 0.5, sum(terms), (np.exp(x) - 1 - x) / x**2)
     return 1 + x * two, two
+
+
+def band_limited_lag(signal: Array, time_constant: float, dt: float) -> Array:
+    """A sampled signal, followed by as much silence, behind a first-order low-pass: exact below half the sample rate.
+
+    Whatever an ideal anti-alias filter leaves of a signal is a sum of tones, each of which the low-pass divides by
+    1 + 2πi f τ.
+    """
+    size = 2 * signal.shape[-1]
+    tones = np.fft.rfft(signal, size) / (1 + 2j * np.pi * np.fft.rfftfreq(size, dt) * time_constant)
+    return np.asarray(np.fft.irfft(tones, size)[..., : signal.shape[-1]])

@@ -9,6 +9,7 @@ import numpy as np
 import scipy.signal
 
 from identification.recording import Array
+from lab.filters import band_limited_lag
 
 ORDER = {
     "actuators": ("held_lag", "gain", "saturation", "delay", "lag"),
@@ -26,6 +27,7 @@ class Path:
         delay: [s].
         lag: time constant of a first-order lag [s]; it has a state of its own in the plant.
         held_lag: the same for an input whose lagging value is held over each sample, as a digital filter gives it [s].
+        band_limited_lag: the same for a recorded channel, behind an ideal anti-alias filter [s].
         limit: saturation either way [unit of the channel].
         hum: sines added, each (frequency [Hz], sine, cosine).
     """
@@ -34,6 +36,7 @@ class Path:
     delay: float = 0.0
     lag: float = 0.0
     held_lag: float = 0.0
+    band_limited_lag: float = 0.0
     limit: float = float("inf")
     hum: tuple[tuple[float, float, float], ...] = ()
 
@@ -71,12 +74,18 @@ def recorded(paths: Sequence[Path], order: Sequence[int], outputs: Array, dt: fl
         if path != Path():
             signal = path.gain * _shifted(outputs[i], _samples(path, dt)) + _hum(path, outputs.shape[1], dt)
             signals[i] = np.clip(signal, -path.limit, path.limit)
-    return signals[list(order)] if order else signals
+    signals = signals[list(order)] if order else signals
+    for path, signal in zip(paths, signals, strict=True):
+        if path.band_limited_lag:
+            signal[:] = band_limited_lag(signal, path.band_limited_lag, dt)
+    return signals
 
 
 def structural(paths: Sequence[Path], order: Sequence[int], recorded: Array, dt: float) -> Array:
     """What the structure's readings were, as far as a recording tells: the paths undone, NaN where they cannot be."""
     readings = np.array(recorded)
+    # What has been averaged away does not come back.
+    readings[[i for i, path in enumerate(paths) if path.band_limited_lag]] = np.nan
     if order:
         readings[list(order)] = recorded
     for i, path in enumerate(paths):

@@ -86,6 +86,8 @@ def simulate(
     records = []
     for number, (load_, blocks) in enumerate(bench.responses(progress)):
         parts = list(blocks)
+        if rig.chain.whole_record:
+            parts = [tuple(np.concatenate(side, axis=1) for side in zip(*parts, strict=True))]
         digitize = bench.digitizer(number, _rms(part[0] for part in parts), _rms(part[1] for part in parts))
         digitized = [digitize(a, b) for a, b in parts]
         measured = [part[0] for part in digitized] if load_.measured else [np.zeros((0, load_.n_samples))]
@@ -127,7 +129,7 @@ def simulate_to_file(
             rms = (_rms(block[side] for block in record.blocks(BLOCK)) for side in (0, 1))
             digitize = bench.digitizer(number, *rms)
             final.start(load_.kind)
-            for inputs, outputs in record.blocks(BLOCK):
+            for inputs, outputs in record.blocks(record.n_samples if rig.chain.whole_record else BLOCK):
                 inputs, outputs = digitize(inputs, outputs)
                 final.append(inputs if load_.measured else np.zeros((0, outputs.shape[1])), outputs)
 

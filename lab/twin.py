@@ -264,6 +264,11 @@ def _behind_chain(rig: Rig, plant: Plant) -> Plant:
                 path = _passed(path, stage)
             plant = change(plant, i, **vars(path))
     names = [channel.name for channel in rig.outputs]
+    for stage in chain.acquisition:
+        if isinstance(stage, stages.BandLimitedLag):
+            plant = plant.with_output(
+                names.index(stage.channel), band_limited_lag=1 / (2 * np.pi * stage.corner_hz)
+            )
     order = list(range(len(names)))
     for a, b in chain.swaps:
         i, j = names.index(a), names.index(b)

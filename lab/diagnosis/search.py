@@ -168,11 +168,11 @@ def search(
     proposed = [h for h in proposed if (h.kind, h.location) not in taken]
     rows = screen(misfit, theta, causes, observer, proposed)
     picked: list[Hypothesis] = []
-    places: set[tuple[str, str]] = set()
+    places: set[tuple[str, str, str]] = set()
     for row in rows:
         h = row.hypothesis
-        key = (h.kind.cause, h.location)
-        same = sum(other.kind is h.kind for other in picked)
+        key = (h.kind.cause, h.location, str(h.guess.fixed))
+        same = sum(other.kind is h.kind and other.guess.fixed == h.guess.fixed for other in picked)
         if key not in places and same < PER_CAUSE and len(picked) < REFITTED and row.score > -30:
             picked.append(h)
             places.add(key)

@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import ClassVar
 
-from lab.chain import Lag
+from lab.chain import BandLimitedLag, Lag
 from lab.effects.effect import AtOutput, Effect
 from lab.effects.survey import Guess, Survey
 from lab.plant import Plant
@@ -19,22 +19,30 @@ class SensorLag(AtOutput, Effect):
 
     Attributes:
         corner_hz: corner frequency [Hz].
+        band_limited: whether the channel's signal is limited to half the sample rate before it lags.
     """
 
     cause: ClassVar[str] = "sensor_lag"
     units: ClassVar[dict[str, str]] = {"corner_hz": "Hz"}
     positive: ClassVar[tuple[str, ...]] = ("corner_hz",)
     corner_hz: float
+    band_limited: bool = False
 
     def hide(self, rig: Rig) -> Rig:
         self.require_positive("corner_hz")
-        return self.with_stage(rig, Lag(self.location, self.corner_hz))
+        if not self.band_limited:
+            return self.with_stage(rig, Lag(self.location, self.corner_hz))
+        self.require(self.location, [channel.name for channel in rig.outputs], "output channel")
+        stage, chain = BandLimitedLag(self.location, self.corner_hz), rig.chain
+        return rig.with_chain(replace(chain, acquisition=(stage, *chain.acquisition)))
 
     def explain(self, plant: Plant, survey: Survey) -> Plant:
         i = survey.output(self.location)
-        return plant.with_output(i, lag=1 / (2 * math.pi * self.corner_hz))
+        tau = 1 / (2 * math.pi * self.corner_hz)
+        return plant.with_output(i, **{"band_limited_lag" if self.band_limited else "lag": tau})
 
     @classmethod
     def guesses(cls, survey: Survey, location: str) -> list[Guess]:
         corner = 0.4 / survey.dt
-        return [Guess({"corner_hz": corner}, {"corner_hz": corner})]
+        start, scale = {"corner_hz": corner}, {"corner_hz": corner}
+        return [Guess(start, scale, {"band_limited": limited}) for limited in (False, True)]

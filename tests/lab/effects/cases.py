@@ -153,6 +153,21 @@ def _held_lag(time_constant: float) -> Callable[[Array], Array]:
     return change
 
 
+def _band_limited_lag(corner_hz: float) -> Callable[[Array], Array]:
+    """Every tone of the signal and as much silence divided by 1 + i f / f_c, tone by tone."""
+
+    def change(y: Array) -> Array:
+        n, t = y.size, np.arange(y.size)
+        w = np.zeros(n)
+        for k in range(n + 1):
+            tone = np.exp(1j * pi * k * t / n)
+            size = np.vdot(tone, y) / n / (2 if k in (0, n) else 1)
+            w += (size * tone / (1 + 1j * k / (2 * n * DT) / corner_hz)).real
+        return w
+
+    return change
+
+
 def _sine(frequency_hz: float, amplitude: float, phase: float, n: int) -> Array:
     return amplitude * np.sin(2 * pi * frequency_hz * DT * np.arange(n) + phase)
 
@@ -282,6 +297,11 @@ CASES: dict[str, Case] = {
         EFFECTS["sensor_delay"]("acc0.x", delay=1.25 * DT), _late_output(0, 1.25 * DT, 4), order=None
     ),
     "sensor lag": Case(EFFECTS["sensor_lag"]("acc0.x", corner_hz=4.0), _lagging_output(0, 4.0), order=None),
+    "sensor lag, band-limited": Case(
+        EFFECTS["sensor_lag"]("acc0.x", corner_hz=4.0, band_limited=True),
+        _with_output(0, _band_limited_lag(4.0)),
+        order=None,
+    ),
     "sensor saturation": Case(
         EFFECTS["sensor_saturation"]("acc2.x", limit=0.6),
         _with_output(2, lambda y: _clipped(y, 0.6)),
