@@ -7,13 +7,16 @@ from typing import NamedTuple
 
 import numpy as np
 
-from identification.errors import IdentificationError, RecordingError
+from identification.error_bars import covariance_of
+from identification.errors import IdentificationError, NotSecondOrderError, RecordingError
+from identification.matrix_scatter import matrices_with_std
 from identification.modal_parameters import modal_parameters
 from identification.modes import Modes
-from identification.output_error import output_error, simulated
+from identification.output_error import OutputError, output_error, simulated
+from identification.parameterizations import Tangent
 from identification.recording import Array, Recording
 from identification.regression import FROM_REST
-from identification.scoring import maximize, noise_model, solve_linear
+from identification.scoring import Optimum, maximize, noise_model, solve_linear
 from identification.second_order import second_order
 from identification.systems import SecondOrder, StateSpace
 
@@ -25,11 +28,14 @@ class ForcedModel(NamedTuple):
         system: two states per mode, sampled.
         residuals: measured minus simulated outputs of each record, shape (n_outputs, n_samples).
         n_unknowns: numbers fitted: poles, shapes, participation, direct terms and initial states.
+        spread: how the model moves along independent directions, by one standard deviation along each; None where it
+            is not at a maximum of the likelihood, or the data do not determine it.
     """
 
     system: StateSpace
     residuals: tuple[Array, ...]
     n_unknowns: int
+    spread: Tangent | None
 
 
 def forced_model(recording: Recording, modes: Modes, *, likeliest: bool = False) -> ForcedModel:
@@ -43,6 +49,9 @@ def forced_model(recording: Recording, modes: Modes, *, likeliest: bool = False)
         modes: frequency, damping and shape at the outputs of the recording; a growing one is taken to decay.
         likeliest: move poles and shapes too, to the maximum of the likelihood nearby, so that nothing but noise
             is left.
+
+    Returns:
+        The model, and what it leaves.
 
     Raises:
         RecordingError: a record has no inputs.
@@ -67,25 +76,71 @@ def forced_model(recording: Recording, modes: Modes, *, likeliest: bool = False)
     linear = np.arange(q.size) >= problem.n_theta
     linear[: problem.n_theta] = family.unknown
     q = solve_linear(problem, q, linear)
+    spread = None
     if likeliest:
-        q = maximize(problem, noise_model(problem, per_record=True), q).q
+        optimum = maximize(problem, noise_model(problem, per_record=True), q)
+        q, spread = optimum.q, _spread(problem, optimum)
     system = problem.tangent(q).system
     fitted = simulated(system, problem.runs, problem.initial(q))
     residuals = tuple(run.outputs - y for run, y in zip(problem.runs, fitted, strict=True))
-    return ForcedModel(system, residuals, q.size)
+    return ForcedModel(system, residuals, q.size, spread)
 
 
-def forced_matrices(recording: Recording, modes: Modes, *, dofs: Sequence[str] | None = None) -> SecondOrder:
-    """Mass, damping and stiffness from modes and the inputs that drove them.
+def _spread(problem: OutputError, optimum: Optimum) -> Tangent | None:
+    """How far the noise may have moved the model, direction by direction."""
+    covariance, blind = covariance_of(optimum.information, problem.n_theta)
+    if not optimum.converged or blind.shape[1]:
+        return None
+    # What the fit has absorbed of the noise is given back.
+    absorbed = problem.n_unknowns / (float(np.sum(problem.n_samples)) * len(problem.outputs))
+    variance, V = np.linalg.eigh(covariance / (1 - absorbed))
+    moves = V * np.sqrt(np.maximum(variance, 0))  # (n_theta, n_directions)
+    tangent = problem.tangent(optimum.q)
+    A, B, C, D = (np.einsum("pd,p...->d...", moves, getattr(tangent, f"{name}_theta")) for name in "ABCD")
+    return Tangent(tangent.system, A, B, C, D)
+
+
+class ForcedMatrices(NamedTuple):
+    """Matrices, and one sentence on the model that they follow from."""
+
+    matrices: SecondOrder
+    sentence: str
+
+
+def forced_matrices(
+    recording: Recording, modes: Modes, *, dofs: Sequence[str] | None = None, uncertainty: bool = True
+) -> ForcedMatrices:
+    """Mass, damping and stiffness of the likeliest model near given modes, under the inputs that drove it.
+
+    Shapes bear more error than poles do, and matrices suffer most from it: those of the likeliest model scatter several
+    times less than those of modes with inputs fitted to them, which stand only where there is no likeliest model nearby.
 
     Args:
         recording: as for `forced_model`.
         modes: one per degree of freedom.
         dofs: as for `second_order`.
+        uncertainty: whether to find the standard deviations too, where there is a likeliest model.
+
+    Returns:
+        M, C_d and K, and whether a likeliest model stands behind them.
 
     Raises:
         NotSecondOrderError: as for `second_order`.
 
-    Source: as for `forced_model` and `second_order`.
+    Source: Ljung (1999), System Identification, 2nd ed., eq. (7.76); De Angelis et al. (2002), J. Appl. Mech. 69,
+        eq. (18).
     """
-    return second_order(forced_model(recording, modes).system, dofs=dofs)
+    matrices = second_order(forced_model(recording, modes).system, dofs=dofs)
+    try:
+        model = forced_model(recording, modes, likeliest=True)
+        if model.spread is not None:
+            matrices = second_order(model.system, dofs=matrices.dofs)
+            matrices = matrices_with_std(matrices, model.spread) if uncertainty else matrices
+            return ForcedMatrices(matrices, _of("the likeliest model near these modes"))
+    except NotSecondOrderError:
+        pass
+    return ForcedMatrices(matrices, _of("these modes, as there is no likeliest model near them"))
+
+
+def _of(what: str) -> str:
+    return f"Mass, damping and stiffness are those of {what}."

@@ -57,17 +57,21 @@ class Found:
 
 
 def matrices_of(
-    found: Found, dofs: Sequence[str] | None
-) -> tuple[SecondOrder | None, Found | None, tuple[str, ...]]:
-    """M, C_d and K, the modes that they follow from if any, or why there are none.
+    found: Found, dofs: Sequence[str] | None, *, uncertainty: bool = True
+) -> tuple[SecondOrder | None, tuple[str, ...]]:
+    """M, C_d and K with where they come from, or why there are none.
 
     Of a model with two states per degree of freedom where the method realizes the response to known forces; else of
-    one mode per degree of freedom, with the inputs fitted to them. Where other than that many modes were found,
-    pLSCF is asked for that many.
+    the likeliest model near one mode per degree of freedom. Where other than that many modes were found, pLSCF is
+    asked for that many.
 
     Args:
         found: modes and models.
         dofs: as for `second_order`.
+        uncertainty: as for `forced_matrices`.
+
+    Returns:
+        The matrices or None, and sentences on them.
 
     Source: De Angelis et al. (2002), J. Appl. Mech. 69, eq. (18).
     """
@@ -77,13 +81,16 @@ def matrices_of(
             n_states = 2 * len(layout(system.outputs, system.inputs, dofs=dofs).dofs)
             if n_states in realization.orders:
                 system = realization.at(n_states)
-            return second_order(system, dofs=dofs), None, ()
+            return second_order(system, dofs=dofs), ()
         names = layout(found.recording.outputs, found.recording.inputs, dofs=dofs).dofs
         if len(found.modes) != len(names) and realization.settings.get("poles") == "all":
             found = _of_order(found, 2 * len(names))
-        return forced_matrices(found.recording, found.modes, dofs=names), found, ()
+        matrices, sentence = forced_matrices(
+            found.recording, found.modes, dofs=names, uncertainty=uncertainty
+        )
     except IdentificationError as error:
-        return None, None, (f"Mass, damping and stiffness are left out: {error}.",)
+        return None, (f"Mass, damping and stiffness are left out: {error}.",)
+    return matrices, (sentence,)
 
 
 def _of_order(found: Found, order: int) -> Found:

@@ -18,7 +18,7 @@ from identification.output_only import horizon_warning
 from identification.recording import Recording
 from identification.refinement import Refinement, refinement
 from identification.settled import NESTED, settle
-from identification.spectral_scatter import SPECTRAL, spectral_std, with_std
+from identification.spectral_scatter import SPECTRAL, spectral_std
 from identification.stability import Stabilization, stabilize
 from identification.systems import Realization, SecondOrder
 from identification.uncertainty import Placed, matrices_with_error_bars, modes_with_error_bars
@@ -106,13 +106,13 @@ def identify(
         realization, note = _lowest_complete(realization, stabilization)
         notes += note
     found = Found(recording, realization, stabilization, modes, places, settings)
-    matrices, source, verdict = matrices_of(found, dofs)
+    matrices, verdict = matrices_of(found, dofs, uncertainty=uncertainty)
     refined, after, doubts = _refined(found, matrices) if refine else (None, (), ())
     if refined is not None:
         modes, matrices = refined.modes, refined.second_order
         stable = tuple(stable[k] for k in refined.partners)
     elif uncertainty:
-        modes, matrices, missing = _error_bars(found, matrices, source)
+        modes, matrices, missing = _error_bars(found, matrices)
         after += missing
     warnings = (
         *_order_warnings(realization, modes),
@@ -202,51 +202,35 @@ def _refined(
 
 
 def _error_bars(
-    found: Found, matrices: SecondOrder | None, source: Found | None
+    found: Found, matrices: SecondOrder | None
 ) -> tuple[Modes, SecondOrder | None, tuple[str, ...]]:
     """Modes and matrices with their standard deviations, or the reasons why they have none."""
     modes, notes = found.modes, []
     try:
-        modes, matrices = _bars_of_modes(found, matrices if source is found else None, matrices)
+        modes = _bars_of_modes(found)
     except IdentificationError as error:
         notes.append(f"The modes have no error bars: {error}.")
     if matrices is not None and matrices.mass_std is None:
         try:
-            matrices = _bars_of_matrices(found, matrices, source)
+            matrices = matrices_with_error_bars(
+                found.recording, found.realization, matrices, 2 * len(matrices.dofs)
+            )
         except IdentificationError as error:
             notes.append(f"Mass, damping and stiffness have no error bars: {error}.")
     return modes, matrices, tuple(notes)
 
 
-def _bars_of_modes(
-    found: Found, own: SecondOrder | None, matrices: SecondOrder | None
-) -> tuple[Modes, SecondOrder | None]:
-    """Modes with error bars, and the matrices that follow from them, `own`, as well where that costs nothing more."""
+def _bars_of_modes(found: Found) -> Modes:
+    """Modes with error bars."""
+    given = found.settings
     if found.realization.method not in SPECTRAL:
-        modes = modes_with_error_bars(
-            found.recording, found.realization, found.modes, places=found.places, settings=found.settings
+        return modes_with_error_bars(
+            found.recording, found.realization, found.modes, places=found.places, settings=given
         )
-        return modes, matrices
     if not len(found.modes):
-        return found.modes, matrices
-    std = spectral_std(
-        found.recording,
-        found.realization,
-        found.tracks(),
-        dofs=None if own is None else own.dofs,
-        settings=found.settings,
-    )
-    return with_std(found.modes, matrices, std)
-
-
-def _bars_of_matrices(found: Found, matrices: SecondOrder, source: Found | None) -> SecondOrder:
-    """Matrices of a model with inputs, or of modes (`source`) to which the inputs were fitted."""
-    if source is None:
-        return matrices_with_error_bars(found.recording, found.realization, matrices, 2 * len(matrices.dofs))
-    std = spectral_std(
-        source.recording, source.realization, source.tracks(), dofs=matrices.dofs, settings=source.settings
-    )
-    return with_std(source.modes, matrices, std)[1] or matrices
+        return found.modes
+    frequency, damping = spectral_std(found.recording, found.realization, found.tracks(), settings=given)
+    return replace(found.modes, frequency_std=frequency, damping_std=damping)
 
 
 def _order_warnings(realization: Realization, modes: Modes) -> tuple[str, ...]:

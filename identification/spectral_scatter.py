@@ -1,4 +1,4 @@
-"""Error bars of modes and matrices whose method works on spectra: `plscf` and `efdd`.
+"""Error bars of modes whose method works on spectra: `plscf` and `efdd`.
 
 - `plscf` with measured forces: the noise that the model leaves, redrawn (`residual_scatter`).
 - `plscf` of outputs alone: parts of the record left out in turn (`resampling`).
@@ -17,9 +17,9 @@ from typing import Any
 import numpy as np
 
 from identification.clusters import Indices, Poles, cluster_means
-from identification.errors import IdentificationError, NotSecondOrderError, TooShortError
+from identification.errors import IdentificationError, TooShortError
 from identification.fdd import decomposition
-from identification.forced_model import forced_matrices, forced_model
+from identification.forced_model import forced_model
 from identification.frequency_domain import spread_references
 from identification.methods import find_method
 from identification.modes import Complex, Modes
@@ -28,7 +28,7 @@ from identification.resampling import jackknife_std, spread_of_parts
 from identification.residual_scatter import residual_std
 from identification.spectra import cross_spectra
 from identification.stability import Stabilization
-from identification.systems import Realization, SecondOrder
+from identification.systems import Realization
 
 SPECTRAL = ("plscf", "efdd")
 """Methods served here."""
@@ -106,20 +106,18 @@ def spectral_std(
     realization: Realization,
     tracks: Tracks,
     *,
-    dofs: Sequence[str] | None = None,
     settings: Mapping[str, Any] | None = None,
-) -> tuple[Array, Array, tuple[Array, Array, Array] | None]:
-    """Standard deviations of frequencies [Hz] and damping ratios, and of M, C_d and K where they are asked for.
+) -> tuple[Array, Array]:
+    """Standard deviations of frequencies [Hz] and damping ratios.
 
     Args:
         recording: the one that was realized.
-        realization: by a method of `SPECTRAL`; by any other one for the matrices alone.
+        realization: by a method of `SPECTRAL`.
         tracks: where the modes stand among its models.
-        dofs: degrees of freedom of the matrices that follow from the modes and the inputs; None for no matrices.
         settings: further settings that the method was given.
 
     Returns:
-        Shapes (n_modes,) each, and three matrices (n_dofs, n_dofs) or None; infinite where a mode is lost.
+        Shapes (n_modes,) each; infinite where a mode is lost.
 
     Raises:
         TooShortError: too few data to tell.
@@ -129,18 +127,20 @@ def spectral_std(
     """
     if realization.method == "efdd":
         std = _leaving_pieces_out(recording, realization, tracks)
-        return std[0], std[1], None
-    orders = np.unique(tracks.orders).tolist()
-    again = repeat(recording, realization, orders, settings or {})
+        return std[0], std[1]
+    again = repeat(recording, realization, np.unique(tracks.orders).tolist(), settings or {})
+    n = len(np.unique(tracks.mode))
 
     def estimate(part: Recording) -> Array:
         try:
             modes = tracks.modes(again(part))
         except IdentificationError:  # too few poles of that part decay
             modes = None
-        return _values(part, modes, len(np.unique(tracks.mode)), dofs)
+        return (
+            np.full(2 * n, np.nan) if modes is None else np.hstack([modes.frequency_hz, modes.damping_ratio])
+        )
 
-    if realization.method == "plscf" and realization.system.inputs:
+    if realization.system.inputs:
         modes = tracks.modes(again(recording))
         if modes is None:
             raise IdentificationError(
@@ -150,39 +150,7 @@ def spectral_std(
         std = residual_std(recording, model.residuals, estimate, n_unknowns=model.n_unknowns)
     else:
         std = jackknife_std(recording, estimate)
-    n = len(np.unique(tracks.mode))
-    if dofs is None:
-        return std[:n], std[n : 2 * n], None
-    M, C, K = std[2 * n :].reshape(3, len(dofs), len(dofs))
-    return std[:n], std[n : 2 * n], (M, C, K)
-
-
-def with_std(
-    modes: Modes, matrices: SecondOrder | None, std: tuple[Array, Array, tuple[Array, Array, Array] | None]
-) -> tuple[Modes, SecondOrder | None]:
-    """Modes and matrices with what `spectral_std` tells of them."""
-    frequency, damping, of_matrices = std
-    modes = replace(modes, frequency_std=frequency, damping_std=damping)
-    if matrices is not None and of_matrices is not None:
-        M, C, K = of_matrices
-        matrices = replace(matrices, mass_std=M, damping_std=C, stiffness_std=K)
-    return modes, matrices
-
-
-def _values(part: Recording, modes: Modes | None, n: int, dofs: Sequence[str] | None) -> Array:
-    """Frequencies, damping ratios and the entries of the matrices, NaN where they cannot be had."""
-    n_entries = 0 if dofs is None else 3 * len(dofs) ** 2
-    values = np.full(2 * n + n_entries, np.nan)
-    if modes is None:
-        return values
-    values[:n], values[n : 2 * n] = modes.frequency_hz, modes.damping_ratio
-    if dofs is not None:
-        try:
-            found = forced_matrices(part, modes, dofs=dofs)
-        except NotSecondOrderError:
-            return values
-        values[2 * n :] = np.concatenate([X.ravel() for X in (found.mass, found.damping, found.stiffness)])
-    return values
+    return std[:n], std[n:]
 
 
 def repeat(

@@ -18,11 +18,11 @@ from dataclasses import replace
 from typing import Any, NamedTuple
 
 import numpy as np
-import scipy.linalg
 
 from identification.covariance_scatter import covariance_scatter
 from identification.error_bars import modes_with_std
 from identification.errors import IdentificationError
+from identification.matrix_scatter import matrices_with_std
 from identification.methods import find_method
 from identification.modes import Modes
 from identification.observer_scatter import observer_tangent
@@ -30,13 +30,9 @@ from identification.parameterizations import Tangent
 from identification.pulse_scatter import pulse_tangent
 from identification.recording import Array, Recording
 from identification.resampling import jackknife_std
-from identification.second_order import second_order
 from identification.settled import NESTED
 from identification.spectral_scatter import SPECTRAL, Tracks, spectral_std
 from identification.systems import Realization, SecondOrder
-
-STEP = 1e-6
-"""Relative step of a difference quotient."""
 
 
 class Placed(NamedTuple):
@@ -82,7 +78,7 @@ def modes_with_error_bars(
     elif realization.method in ("era", "okid_era"):
         std = _from_tangents(recording, realization, places)
     elif realization.method in SPECTRAL:
-        std = spectral_std(recording, realization, Tracks.of_places(places), settings=given)[:2]
+        std = spectral_std(recording, realization, Tracks.of_places(places), settings=given)
     else:
         std = _from_parts(recording, realization, places, given)
     return replace(modes, frequency_std=std[0], damping_std=std[1])
@@ -108,10 +104,7 @@ def matrices_with_error_bars(
 
     Source: as for `pulse_tangent` and `observer_tangent`; the derivatives are central differences.
     """
-    tangent = _tangent(recording, realization, order, inputs=True)
-    moves = [_matrix_move(direction, matrices.dofs) for direction in _directions(tangent)]
-    mass, damping, stiffness = (np.sqrt(np.sum(np.square(each), axis=0)) for each in zip(*moves, strict=True))
-    return replace(matrices, mass_std=mass, damping_std=damping, stiffness_std=stiffness)
+    return matrices_with_std(matrices, _tangent(recording, realization, order, inputs=True))
 
 
 def _tangent(recording: Recording, realization: Realization, order: int, *, inputs: bool) -> Tangent:
@@ -162,47 +155,3 @@ def _from_parts(
 
     std = jackknife_std(recording, estimate).reshape(2, -1)
     return std[0], std[1]
-
-
-def _directions(tangent: Tangent) -> list[Tangent]:
-    """One tangent per direction; no more directions than the model has parameters, for the same covariance."""
-    names = ("A_theta", "B_theta", "C_theta", "D_theta")
-    shapes = [getattr(tangent, name).shape[1:] for name in names]
-    flat = np.hstack([getattr(tangent, name).reshape(len(tangent.A_theta), -1) for name in names])
-    if flat.shape[0] > flat.shape[1]:
-        flat = scipy.linalg.qr(flat, mode="r")[0][: flat.shape[1]]
-    cuts = np.cumsum([int(np.prod(shape)) for shape in shapes])[:-1]
-    rows = [np.split(row, cuts) for row in flat]
-    return [
-        Tangent(tangent.system, *(part.reshape(1, *shape) for part, shape in zip(row, shapes, strict=True)))
-        for row in rows
-    ]
-
-
-def _matrix_move(direction: Tangent, dofs: tuple[str, ...]) -> tuple[Array, Array, Array]:
-    """How M, C_d and K move along a direction."""
-    system = direction.system
-    steps = {name: getattr(direction, f"{name}_theta")[0] for name in "ABCD"}
-    size = max(
-        float(np.linalg.norm(step) / np.linalg.norm(getattr(system, name)))
-        for name, step in steps.items()
-        if np.any(getattr(system, name))
-    )
-    if size == 0:
-        zero = np.zeros((len(dofs), len(dofs)))
-        return zero, zero, zero
-    h = STEP / size
-    ahead, behind = (
-        second_order(
-            replace(
-                system, **{name: getattr(system, name) + sign * h * step for name, step in steps.items()}
-            ),
-            dofs=dofs,
-        )
-        for sign in (1, -1)
-    )
-    return (
-        (ahead.mass - behind.mass) / (2 * h),
-        (ahead.damping - behind.damping) / (2 * h),
-        (ahead.stiffness - behind.stiffness) / (2 * h),
-    )

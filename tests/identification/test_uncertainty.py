@@ -15,6 +15,7 @@ from identification.error_bars import modes_with_std
 from identification.errors import IdentificationError, TooShortError
 from identification.hankel_perturbation import hankel_tangent
 from identification.identify import identify
+from identification.matrix_scatter import matrix_move
 from identification.observer_scatter import Signals, _score
 from identification.parameterizations import Tangent
 from identification.pulse import markov_parameters
@@ -22,7 +23,6 @@ from identification.recording import Record, Recording
 from identification.resampling import jackknife_std, without_part
 from identification.second_order import second_order
 from identification.series_scatter import std_of_sum
-from identification.uncertainty import _matrix_move
 from tests.ambient import ambient, output_record
 from tests.systems import noisy, paper_chain3, pulse_recording, recorded
 
@@ -55,7 +55,7 @@ def test_the_model_moves_as_the_realization_of_moved_markov_parameters_does():
         dofs = second_order(system).dofs
         M1, M0 = second_order(ahead, dofs=dofs), second_order(behind, dofs=dofs)
         for move, name in zip(
-            _matrix_move(one(tangent, k), dofs), ("mass", "damping", "stiffness"), strict=True
+            matrix_move(one(tangent, k), dofs), ("mass", "damping", "stiffness"), strict=True
         ):
             slope = (getattr(M1, name) - getattr(M0, name)) / (2 * h)
             assert_allclose(move, slope, atol=1e-4 * np.max(np.abs(slope)))
