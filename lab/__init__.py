@@ -31,6 +31,7 @@ if TYPE_CHECKING:
     from lab.run import identify_file, run
     from lab.scenario import Scenario, load_scenario
     from lab.simulate import simulate
+    from lab.study.conduct import study
 
 _WHERE = {
     "Diagnosis": ("lab.diagnosis.outcome", "Diagnosis"),
@@ -50,6 +51,7 @@ _WHERE = {
     "run": ("lab.run", "run"),
     "save_recording": ("lab.files.recording", "save"),
     "simulate": ("lab.simulate", "simulate"),
+    "study": ("lab.study.conduct", "study"),
 }
 
 __all__ = [
@@ -70,6 +72,7 @@ __all__ = [
     "run",
     "save_recording",
     "simulate",
+    "study",
 ]
 
 

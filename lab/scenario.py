@@ -162,6 +162,11 @@ class Scenario(Table):
         """The file as written, empty for a scenario made in Python."""
         return self._text
 
+    @property
+    def folder(self) -> Path:
+        """From where the model file is seen."""
+        return self._folder
+
     def model_file(self) -> Path:
         """Where the model lies.
 
@@ -221,16 +226,31 @@ def load_scenario(path: str | Path) -> Scenario:
     except UnicodeDecodeError:
         raise FileError(f"{path}: is not text; expected a scenario file (TOML)") from None
     try:
-        scenario = Scenario.model_validate(tomllib.loads(text))
-        scenario._folder, scenario._text = path.parent, text
-        scenario.drive()
-        scenario.hidden()
+        return make_scenario(tomllib.loads(text), folder=path.parent, text=text)
     except tomllib.TOMLDecodeError as error:
         raise StudyError(f"{path}: is not TOML ({error})") from None
-    except ValidationError as error:
-        raise StudyError(f"{path}: {_explain(error)}") from None
     except StudyError as error:
         raise StudyError(f"{path}: {error}") from None
+
+
+def make_scenario(table: Mapping[str, Any], *, folder: Path = Path(), text: str = "") -> Scenario:
+    """The scenario that a table describes.
+
+    Args:
+        table: as in a scenario file.
+        folder: from where its model file is seen.
+        text: the file as written.
+
+    Raises:
+        StudyError: an unknown or missing key, or an impossible value.
+    """
+    try:
+        scenario = Scenario.model_validate(table)
+    except ValidationError as error:
+        raise StudyError(explain(error)) from None
+    scenario._folder, scenario._text = folder, text
+    scenario.drive()
+    scenario.hidden()
     return scenario
 
 
@@ -251,17 +271,17 @@ def _chosen(table: Mapping[str, Any], name: str, key: str, known: Mapping[str, t
     try:
         return TypeAdapter(known[kind]).validate_json(text, strict=True)
     except ValidationError as error:
-        raise StudyError(_explain(error, name)) from None
+        raise StudyError(explain(error, name)) from None
 
 
-def _explain(error: ValidationError, *inside: str) -> str:
-    """The first complaint in one line: which key, where, what is allowed."""
+def explain(error: ValidationError, *inside: str, model: type[BaseModel] = Scenario) -> str:
+    """The first complaint in one line: which key, where, what is allowed; `model` is that of the whole file."""
     # A misspelt key is also a missing one: the misspelling is the better news.
     first = min(error.errors(include_url=False), key=lambda each: each["type"] != "extra_forbidden")
     *tables, key = (*inside, *(part for part in first["loc"] if isinstance(part, str)))
     key += "".join(f"[{part}]" for part in first["loc"] if isinstance(part, int))
     if first["type"] == "extra_forbidden":
-        return _unknown_key(key, ".".join(tables), _keys(tables))
+        return _unknown_key(key, ".".join(tables), _keys(tables, model))
     where = _place(".".join(tables))
     if first["type"] == "missing":
         return f"key {key!r} is missing {where}"
@@ -276,8 +296,7 @@ def _place(table: str) -> str:
     return f"in [{table}]" if table else "at the top"
 
 
-def _keys(tables: list[str]) -> list[str]:
-    model: type[BaseModel] = Scenario
+def _keys(tables: list[str], model: type[BaseModel]) -> list[str]:
     for table in tables:
         annotation = model.model_fields[table].annotation
         model = next(kind for kind in (annotation, *get_args(annotation)) if isinstance(kind, type))

@@ -20,9 +20,10 @@ from lab.cli.import_ import command as import_
 from lab.cli.listing import command as listing
 from lab.cli.run import command as run
 from lab.cli.shared import example
+from lab.cli.study import command as study
 from lab.cli.view import command as view
 
-COMMANDS = (listing, run, check, identify, diagnose, import_, export, view)
+COMMANDS = (listing, run, check, identify, diagnose, study, import_, export, view)
 """One file each."""
 
 

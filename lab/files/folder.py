@@ -21,6 +21,7 @@ OUTPUTS = {
     "extended.xml",
     "placement.json",
     "study.h5",
+    "study.jsonl",
 }
 """What the lab writes into an output folder; `force` replaces a folder only when nothing else is in it."""
 
