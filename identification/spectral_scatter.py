@@ -81,17 +81,19 @@ class Tracks:
         return cls(found.orders[rows], omega * (-zeta + 1j * np.sqrt(1 - zeta**2)), found.cluster[rows])
 
     def modes(self, realization: Realization) -> Modes | None:
-        """The means of the poles that stand nearest; None where one is lost."""
-        models = {int(order): realization.at(int(order)).modes() for order in np.unique(self.orders)}
+        """The means of the poles that stand nearest, each for one mode at most; None where one is lost."""
+        from scipy.optimize import linear_sum_assignment  # slow to load
+
         picked = []
-        for order, pole in zip(self.orders, self.poles, strict=True):
-            own = models[int(order)]
-            if not len(own):
+        for order in np.unique(self.orders):
+            own, mine = realization.at(int(order)).modes(), self.poles[self.orders == order]
+            if len(own) < mine.size:
                 return None
-            nearest = int(np.argmin(np.abs(own.poles - pole)))
-            if abs(own.poles[nearest] - pole) > LOST * abs(pole):
+            gap = np.abs(own.poles - mine[:, None])
+            nearest = linear_sum_assignment(gap)[1]
+            if np.any(gap[np.arange(mine.size), nearest] > LOST * np.abs(mine)):
                 return None
-            picked.append(own.take([nearest]))
+            picked.append(own.take(nearest))
         shapes = np.concatenate([each.shapes for each in picked], axis=1)
         frequency, damping = (
             np.concatenate([getattr(each, name) for each in picked])
