@@ -23,7 +23,9 @@ class Thresholds:
     """When two poles count as the same, and when a pole counts as no oscillation at all.
 
     Attributes:
-        frequency_tolerance: largest relative difference of frequency.
+        frequency_tolerance: largest relative difference of frequency. A larger one passes as far as
+            damping_tolerance times the damping ratio, since a pole scatters along frequency as much as along
+            damping [rad/s].
         damping_tolerance: largest relative difference of damping.
         damping_step: a smaller difference of the damping ratio passes too, since the relative scatter of
             light damping is large in any record.
@@ -105,12 +107,13 @@ def difference(a: Poles, b: Poles, limits: Thresholds) -> Difference:
         |λ_a - λ_b| / |λ| + 1 - MAC, with each part divided by what is allowed.
     """
     f = a.frequency_hz[:, None]
-    frequency = np.abs(f - b.frequency_hz) / (limits.frequency_tolerance * f)
     z = a.damping_ratio[:, None]
+    allowed = np.maximum(limits.frequency_tolerance, limits.damping_tolerance * z)
+    frequency = np.abs(f - b.frequency_hz) / (allowed * f)
     step = np.abs(z - b.damping_ratio)
     damping = step / np.maximum(limits.damping_tolerance * z, limits.damping_step)
     shape = (1 - np.abs(a.shapes.conj().T @ b.shapes) ** 2) / (1 - limits.min_mac)
-    plane = np.hypot(frequency, step / limits.frequency_tolerance)
+    plane = np.hypot(frequency, step / allowed)
     return Difference(frequency, shape, damping, plane + shape)
 
 

@@ -17,7 +17,7 @@ from identification.modes import Modes
 from identification.output_only import horizon_warning
 from identification.recording import Recording
 from identification.refinement import Refinement, refinement
-from identification.settled import NESTED, settle
+from identification.settled import NESTED, brief_warnings, settle
 from identification.spectral_scatter import SPECTRAL, spectral_std
 from identification.stability import Stabilization, stabilize
 from identification.systems import Realization, SecondOrder
@@ -91,6 +91,7 @@ def identify(
     realization = chosen(recording, order, **settings)
     notes = (f"The method is {name}, {reason}.", *realization.notes)
     stabilization = stabilize(realization) if len(realization.systems) > 1 else None
+    brief: tuple[bool, ...] = ()
     if stabilization is None or chosen.finds_order or order is not None:
         modes, places = realization.system.modes().normalized(), None
         stable = _stays_put(modes, stabilization)
@@ -99,7 +100,7 @@ def identify(
         modes, places = settled.modes, [Placed(*place) for place in settled.places]
         stable = (True,) * len(modes)
         realization = replace(realization, order=settled.order)
-        notes += (settled.note,)
+        notes, brief = (*notes, *settled.notes), settled.brief
     else:
         modes, places = stabilization.modes, first_settled(stabilization)
         stable = (True,) * len(modes)
@@ -116,6 +117,7 @@ def identify(
         after += missing
     warnings = (
         *_order_warnings(realization, modes),
+        *(brief_warnings(modes, brief) if brief and not refined else ()),
         *(horizon_warning(modes, realization) if name in (*NESTED, "era") else ()),
         *(() if refined else _length_warnings(recording, realization, modes)),
         *doubts,

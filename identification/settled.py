@@ -7,9 +7,11 @@ estimates scatter more, and to first order nothing is known of that scatter.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
 from identification.clusters import Indices, Poles, Thresholds, difference
 from identification.modes import Modes
@@ -29,20 +31,22 @@ class Settled(NamedTuple):
         order: the lowest with a pole for every lasting mode.
         modes: sorted by frequency; those that the model of that order lacks come from the first that has them.
         places: order and continuous-time pole [rad/s] of each mode.
-        note: the order and why, one sentence.
+        brief: whether each mode shows at less than half as many orders as the one that lasts longest.
+        notes: the order and why, and which brief poles were taken for part of another mode, one sentence each.
     """
 
     order: int
     modes: Modes
     places: list[tuple[int, complex]]
-    note: str
+    brief: tuple[bool, ...]
+    notes: tuple[str, ...]
 
 
 def settle(stabilization: Stabilization) -> Settled:
     """The modes at the lowest order with a pole for every mode that lasts over the orders.
 
-    A mode lasts when its cluster is at least half as long as the longest; a cluster that appears late and briefly, as when
-    noise splits a mode in two, does not raise the order for all others.
+    A mode lasts when its cluster is at least half as long as the longest. A cluster that appears late and briefly does not
+    raise the order for all others, and is left out where it resembles a mode that lasts, as when noise splits one in two.
 
     Args:
         stabilization: of models of one of the methods `NESTED`, with at least one mode.
@@ -59,21 +63,56 @@ def settle(stabilization: Stabilization) -> Settled:
     orders = np.unique(stabilization.orders)
     position = np.stack([_poles_of_modes(stabilization, order) for order in orders])  # (n_orders, n_modes)
     k = int(np.argmax(np.sum(position[:, lasting] >= 0, axis=1)))
+    split = np.flatnonzero(~lasting & (position[k] < 0) & _like_one_of(stabilization.modes, lasting))
     chosen = np.where(position[k] >= 0, position[k], first)
+    kept = np.delete(np.arange(length.size), split)
+    kept = kept[np.argsort(stabilization.frequency_hz[chosen[kept]], kind="stable")]
+    rows = chosen[kept]
     modes = Modes(
-        stabilization.frequency_hz[chosen],
-        stabilization.damping_ratio[chosen],
-        stabilization.shapes[:, chosen],
+        stabilization.frequency_hz[rows],
+        stabilization.damping_ratio[rows],
+        stabilization.shapes[:, rows],
         stabilization.modes.outputs,
     ).normalized()
-    rank = np.argsort(modes.frequency_hz, kind="stable")
-    modes = modes.take(rank)
-    places = [
-        (int(n), complex(z)) for n, z in zip(stabilization.orders[chosen][rank], modes.poles, strict=True)
-    ]
+    places = [(int(n), complex(z)) for n, z in zip(stabilization.orders[rows], modes.poles, strict=True)]
     here, order = int(np.sum(position[k] >= 0)), int(orders[k])
     note = f"Of {orders.size} orders, {order} is the lowest with a pole for every mode that lasts: {here} of {len(modes)}."
-    return Settled(order, modes, places, note)
+    notes = (note, *(_on_split(stabilization.modes.frequency_hz[m]) for m in split))
+    return Settled(order, modes, places, tuple((~lasting[kept]).tolist()), notes)
+
+
+def brief_warnings(modes: Modes, brief: Sequence[bool]) -> tuple[str, ...]:
+    """One sentence for each mode that is brief and whose damping is not told from zero.
+
+    Args:
+        modes: with standard deviations; without them nothing is said.
+        brief: as of `Settled`.
+
+    Returns:
+        Warnings.
+    """
+    if modes.damping_std is None:
+        return ()
+    return tuple(
+        f"The mode at {f:.4g} Hz shows at few orders only, with a damping ratio that is hardly told from zero "
+        f"({100 * z:.2g} ± {100 * std:.1g} %): it may be noise."
+        for f, z, std, few in zip(
+            modes.frequency_hz, modes.damping_ratio, modes.damping_std, brief, strict=True
+        )
+        if few and z < 2 * std
+    )
+
+
+def _like_one_of(modes: Modes, lasting: NDArray[np.bool_]) -> NDArray[np.bool_]:
+    """Whether each mode resembles one of those that last, other than itself, as chains that are joined do."""
+    poles = Poles.of(modes)
+    apart = difference(poles, poles.take(np.flatnonzero(lasting)), Thresholds())
+    alike = (apart.frequency <= 1) & (apart.shape <= 1) & (apart.damping <= 2)
+    return np.asarray(np.any(alike, axis=1))
+
+
+def _on_split(frequency_hz: float) -> str:
+    return f"A brief pole at {frequency_hz:.4g} Hz is taken for part of the lasting mode that it resembles."
 
 
 def _poles_of_modes(stabilization: Stabilization, order: int) -> Indices:

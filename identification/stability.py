@@ -34,7 +34,7 @@ RULES = {
     "damping too high": "The damping ratio exceeds max_damping: hardly an oscillation.",
     "complex shape": "The modal phase collinearity of the shape is below min_collinearity.",
     "lowest order": "There is no lower order to compare with.",
-    "frequency jumps": "The nearest pole of the next lower order is more than frequency_tolerance away.",
+    "frequency jumps": "The nearest pole of the next lower order is farther away than the tolerances allow.",
     "shape jumps": "The MAC with the nearest pole of the next lower order is below min_mac.",
     "damping jumps": "The damping differs from the nearest pole's by more than both tolerances.",
     "double": "Another pole of the same order is nearer to the pole that this one resembles.",

@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 from numpy.testing import assert_allclose
 
 from identification.modes import Modes
 from identification.recording import Channel
-from identification.settled import settle
+from identification.settled import brief_warnings, settle
 from identification.ssi import ssi_cov
 from identification.stability import Stabilization, stabilize
 from tests.ambient import ambient
@@ -53,7 +55,32 @@ def test_a_brief_cluster_does_not_raise_the_order():
     found = settle(diagram(lines))
     assert found.order == 2
     assert [order for order, _ in found.places] == [2, 24]
-    assert "1 of 2" in found.note
+    assert "1 of 2" in found.notes[0]
+    assert found.brief == (False, True)
+
+
+def test_a_brief_cluster_like_a_lasting_mode_is_part_of_it():
+    lines = [(1.0, (1, 1), 4, range(4, 32, 2)), (1.008, (1, 1), 24, range(24, 32, 2))]
+    found = settle(diagram(lines))
+    assert_allclose(found.modes.frequency_hz, [1.0], rtol=1e-3)
+    assert "1.008 Hz is taken for part" in found.notes[1]
+    # Another shape makes it another mode, and so does a frequency further off.
+    for other in ((1.008, (1, -1)), (1.02, (1, 1))):
+        assert len(settle(diagram([lines[0], (*other, 24, range(24, 32, 2))])).modes) == 2
+
+
+def test_a_brief_mode_without_damping_to_speak_of_is_doubted():
+    modes = Modes(
+        np.array([1.0, 2.0, 3.0]),
+        np.array([0.01, 0.01, 0.01]),
+        np.eye(2)[:, [0, 1, 0]],
+        OUTPUTS,
+        frequency_std=np.full(3, 0.01),
+        damping_std=np.array([0.02, 0.004, 0.02]),
+    )
+    (warning,) = brief_warnings(modes, (False, True, True))
+    assert "3 Hz" in warning
+    assert brief_warnings(replace(modes, frequency_std=None, damping_std=None), (True,) * 3) == ()
 
 
 def test_one_pole_does_not_serve_two_modes():

@@ -99,6 +99,13 @@ def test_agreement_at_two_orders_is_too_small_a_cluster():
     assert np.all((found.cluster >= 0) == (np.array(found.label) == STABLE))
 
 
+def test_a_heavily_damped_pole_may_move_along_frequency_as_far_as_along_damping():
+    # 0.2 of a damping ratio of 0.1 is 2 % of the frequency [rad/s]; a light pole may move by 1 %.
+    for damping, n_modes in ((0.1, 1), (0.02, 0)):
+        models = realized(*([(5.0 * 1.015 ** (i % 2), damping, SHAPE), *fillers(i)] for i in range(8)))
+        assert len(stabilize(models).modes) == n_modes
+
+
 @pytest.mark.parametrize("shape", [OTHER, tuple(np.add(SHAPE, (0, 1e-3, 0)))])
 def test_close_modes_stay_two_modes(shape):
     """Modes 0.03 % apart, as modes 3 and 4 of Juang (1992), 6.1, with different and with nearly equal shapes."""
