@@ -4,6 +4,7 @@
     recording = lab.simulate(rig, lab.EXCITATIONS["pulse"](), sample_rate=20.0, duration=10.0)
     result = lab.run("scenarios/chain3_pulse.toml", "out/chain3_pulse")
     diagnosis = lab.diagnose(recording, rig)
+    placement = lab.place(rig, 5, n_actuators=4, target="matrices")
 
 Names are imported when first used, so that `import lab` is quick.
 """
@@ -26,6 +27,8 @@ if TYPE_CHECKING:
     from lab.files.recording import load as load_recording
     from lab.files.recording import save as save_recording
     from lab.instruments import instrument
+    from lab.placement.outcome import Placement
+    from lab.placement.place import place
     from lab.result import Result
     from lab.rig import Rig
     from lab.run import identify_file, run
@@ -37,6 +40,7 @@ _WHERE = {
     "Diagnosis": ("lab.diagnosis.outcome", "Diagnosis"),
     "EFFECTS": ("lab.effects", "EFFECTS"),
     "EXCITATIONS": ("lab.excitation", "EXCITATIONS"),
+    "Placement": ("lab.placement.outcome", "Placement"),
     "Result": ("lab.result", "Result"),
     "Rig": ("lab.rig", "Rig"),
     "Scenario": ("lab.scenario", "Scenario"),
@@ -48,6 +52,7 @@ _WHERE = {
     "instrument": ("lab.instruments", "instrument"),
     "load_recording": ("lab.files.recording", "load"),
     "load_scenario": ("lab.scenario", "load_scenario"),
+    "place": ("lab.placement.place", "place"),
     "run": ("lab.run", "run"),
     "save_recording": ("lab.files.recording", "save"),
     "simulate": ("lab.simulate", "simulate"),
@@ -58,6 +63,7 @@ __all__ = [
     "EFFECTS",
     "EXCITATIONS",
     "Diagnosis",
+    "Placement",
     "Result",
     "Rig",
     "Scenario",
@@ -69,6 +75,7 @@ __all__ = [
     "instrument",
     "load_recording",
     "load_scenario",
+    "place",
     "run",
     "save_recording",
     "simulate",

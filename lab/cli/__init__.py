@@ -18,12 +18,13 @@ from lab.cli.export import command as export
 from lab.cli.identify import command as identify
 from lab.cli.import_ import command as import_
 from lab.cli.listing import command as listing
+from lab.cli.place import command as place
 from lab.cli.run import command as run
 from lab.cli.shared import example
 from lab.cli.study import command as study
 from lab.cli.view import command as view
 
-COMMANDS = (listing, run, check, identify, diagnose, study, import_, export, view)
+COMMANDS = (listing, run, check, identify, diagnose, place, study, import_, export, view)
 """One file each."""
 
 

@@ -1,0 +1,115 @@
+"""A model file in, a folder with the placement out."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+from lab import catalogue
+from lab.errors import LabError, RigError
+from lab.files.folder import output_folder
+from lab.files.placement import save_placement
+from lab.placement.outcome import Placement
+from lab.placement.place import place
+from lab.placement.plan import Plan, usual_plan
+from lab.rig import Rig
+from lab.scenario import Scenario, load_scenario
+
+
+def place_file(
+    model: str | Path | None,
+    out: str | Path,
+    n_sensors: int,
+    *,
+    scenario: str | Path | None = None,
+    test: Mapping[str, Any] | None = None,
+    force: bool = False,
+    command: str = "",
+    **settings: Any,
+) -> tuple[Placement, Rig]:
+    """Where sensors and actuators of a model should go: found, written, shown.
+
+    Args:
+        model: model file, or a name from the catalogue; that of the scenario when None.
+        out: folder to come, with placement.json, report.html and run.rrd.
+        n_sensors: how many sensors.
+        scenario: scenario file, or a name from the catalogue, of the test that is planned: its layout is ranked too.
+        test: excitation, level, sample_rate, duration, noise_percent and seed of the test, where they differ.
+        force: replace an earlier output there.
+        command: how the lab was called, for the report.
+        settings: as for `lab.placement.place.place`.
+
+    Returns:
+        The placement, and the rig with all candidates connected.
+
+    Raises:
+        LabError, IdentificationError: the model, the test and the numbers do not go together, or the folder cannot be
+            written.
+    """
+    with output_folder(out, force=force) as folder:
+        planned_test = None if scenario is None else load_scenario(scenario)
+        rig = _rig(model, planned_test)
+        rig = rig.connected(outputs=rig.responding)
+        plan = _plan(rig, planned_test, dict(test or {}))
+        if planned_test is not None:
+            settings = {**settings, "planned": _layout(planned_test)}
+        placement = place(rig, n_sensors, plan=plan, **settings)
+        facts = {
+            name: str(value)
+            for name, value in (("Model", model), ("Scenario", scenario))
+            if value is not None
+        }
+        present_placement(folder, placement, rig, command=command, facts=facts)
+    return placement, rig
+
+
+def present_placement(
+    folder: Path, placement: Placement, rig: Rig, *, command: str = "", facts: Mapping[str, str] | None = None
+) -> None:
+    """Writes placement.json, report.html and run.rrd into a folder; arguments as for `place_file`."""
+    # Imported here because drawing is slow to load and `lab` must come up without it.
+    from lab.show.placement_report import write_placement_report
+    from lab.show.rerun_log.placement import write_placement_rrd
+
+    save_placement(placement, folder / "placement.json")
+    write_placement_report(folder / "report.html", placement, rig, command=command, facts=facts)
+    write_placement_rrd(folder / "run.rrd", placement, rig)
+
+
+def _rig(model: str | Path | None, scenario: Scenario | None) -> Rig:
+    if model is None:
+        if scenario is None:
+            raise LabError("neither a model nor a scenario is given; give --model MODEL.xml")
+        path = scenario.model_file()
+    else:
+        path = Path(model) if Path(model).exists() else catalogue.find("models", str(model))
+    try:
+        return Rig.load(path)
+    except RigError as error:
+        raise RigError(f"{error} (in {path})") from None
+
+
+def _plan(rig: Rig, scenario: Scenario | None, test: dict[str, Any]) -> Plan:
+    """The test: that of the scenario, or one that suits the structure, with what is said differently."""
+    given = {name: value for name, value in test.items() if value is not None}
+    own: dict[str, Any] = {}
+    if scenario is not None:
+        own = {
+            "sample_rate": scenario.test.sample_rate,
+            "duration": scenario.test.duration,
+            "seed": scenario.seed,
+        }
+        if scenario.instruments.noise_percent:
+            own["noise_percent"] = scenario.instruments.noise_percent
+    plan = usual_plan(rig.second_order().modes().frequency_hz, **{**own, **given})
+    if scenario is not None and "excitation" not in given and "level" not in given:
+        plan = plan.driven(scenario.drive())
+    return plan
+
+
+def _layout(scenario: Scenario) -> tuple[list[str], list[str]] | None:
+    """Channels of the scenario, where it names both sides."""
+    if scenario.channels.inputs is None or scenario.channels.outputs is None:
+        return None
+    return list(scenario.channels.outputs), list(scenario.channels.inputs)

@@ -1,0 +1,318 @@
+"""Target "modes": sensors that tell the mode shapes apart, actuators that drive every mode."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+import scipy.linalg
+
+from identification.recording import DERIVATIVE, Array
+from lab.errors import LabError
+from lab.placement.candidates import Candidates, force_columns, motion_rows, require_number
+from lab.placement.criteria import CRITERIA, Criterion
+from lab.placement.independence import effective_independence, kinetic_energy
+from lab.placement.loading import added_mass, frequency_shifts
+from lab.placement.outcome import Placement, Ranked
+from lab.placement.search import ceiling, count, enumerated, exchange, greedy
+from lab.rig import Rig
+
+LIMIT = 200_000
+"""Layouts up to this number are all compared, which proves the best."""
+RIGID = 1e-9
+"""A mode whose stiffness is below this share of the largest moves the structure as a whole."""
+TOLD = 10
+"""Best layouts that are told by name."""
+SAME = 1e-9
+"""Figures that differ by less, relatively, are the same."""
+
+
+@dataclass(frozen=True, eq=False)
+class Choice:
+    """Blocks chosen, and what is known about the choice.
+
+    Attributes:
+        chosen: positions of blocks, in rising order.
+        score: of the criterion.
+        ceiling: score that no choice exceeds; None where no bound is known.
+        proven: whether every choice was compared.
+        layouts, scores: of every choice, best first, where all were compared; no rows otherwise.
+    """
+
+    chosen: tuple[int, ...]
+    score: float
+    ceiling: float | None
+    proven: bool
+    layouts: np.ndarray
+    scores: Array
+
+
+def choose(
+    grams: Array, n: int, criterion: Criterion, *, fixed: Sequence[int] = (), limit: int = LIMIT
+) -> Choice:
+    """The n blocks of highest score: proven by enumeration up to a limit, else found by exchange with a bound.
+
+    Args:
+        grams: what each block brings, shape (n_blocks, m, m).
+        n: blocks to choose, the fixed ones included.
+        criterion: score.
+        fixed: blocks in every choice.
+        limit: number of choices up to which all are compared.
+    """
+    if count(len(grams), n, n_fixed=len(fixed)) <= limit:
+        layouts, scores = enumerated(grams, n, criterion, fixed=fixed)
+        order = np.argsort(-scores, kind="stable")
+        layouts, scores = layouts[order], scores[order]
+        best = tuple(int(block) for block in layouts[0])
+        return Choice(best, float(scores[0]), float(scores[0]), True, layouts, scores)
+    best = exchange(grams, greedy(grams, n, criterion, fixed=fixed), criterion, fixed=fixed)
+    score = float(criterion.score(grams[list(best)].sum(axis=0)[None])[0])
+    top = ceiling(grams, best, criterion, fixed=fixed)
+    return Choice(best, score, top, False, np.zeros((0, n), dtype=int), np.zeros(0))
+
+
+def normal_modes(rig: Rig) -> tuple[Array, Array]:
+    """Angular frequencies [rad/s], rising, and shapes of unit modal mass (n_dofs, n_modes); rigid ones left out.
+
+    Undamped: where sensors see modes does not hang on how these decay.
+    """
+    structure = rig.second_order()
+    values, shapes = scipy.linalg.eigh(structure.stiffness, structure.mass)
+    flexible = values > RIGID * values[-1]
+    return np.sqrt(values[flexible]), shapes[:, flexible]
+
+
+def sensor_shapes(rig: Rig, omega: Array, shapes: Array, noise: Mapping[str, float]) -> Array:
+    """Reading of each output per unit of each modal coordinate, in its noise where that is given; (n_outputs, n_modes).
+
+    Raises:
+        LabError: outputs of several quantities, and no noise to compare them by.
+    """
+    rows = motion_rows(rig) @ shapes
+    felt = [channel for channel in rig.outputs if channel.quantity in DERIVATIVE]
+    if noise:
+        std = np.array([noise.get(channel.unit, np.nan) for channel in rig.outputs])
+        lacking = {channel.unit for channel in felt if channel.unit not in noise}
+        if lacking:
+            raise LabError(
+                f"no noise is given for sensors in {', '.join(sorted(lacking))}; expected one number for each unit"
+            )
+        power = np.array([DERIVATIVE.get(channel.quantity, 0) for channel in rig.outputs])
+        return np.asarray(np.nan_to_num(rows * omega ** power[:, None] / std[:, None]))
+    return np.asarray(rows)
+
+
+def place_modes(
+    rig: Rig,
+    sensors: Candidates,
+    actuators: Candidates,
+    n_sensors: int,
+    n_actuators: int,
+    *,
+    criterion: str = "d",
+    n_modes: int | None = None,
+    noise: Mapping[str, float] | None = None,
+    setups: int = 1,
+    references: int = 0,
+    sensor_mass: float = 0.0,
+    planned: tuple[Sequence[int], Sequence[int]] | None = None,
+    limit: int = LIMIT,
+) -> Placement:
+    """The sensors that tell the modes apart best, and the actuators that drive all of them.
+
+    Args:
+        rig: with every candidate channel connected.
+        sensors, actuators: candidates.
+        n_sensors, n_actuators: how many to choose; with roving sensors, those of one set-up.
+        criterion: "d", "a" or "e" for the information about modal coordinates, or "mac".
+        n_modes: lowest modes asked for; as many as channels, or as there are, when None.
+        noise: standard deviation by unit; equal for all sensors when None.
+        setups: set-ups between which sensors rove.
+        references: sensors that stay in every set-up.
+        sensor_mass: of each sensor [kg].
+        planned: sensors and actuators of a layout to be ranked too.
+        limit: number of layouts up to which all are compared.
+
+    Raises:
+        LabError: more modes than the sensors can tell apart, an unknown criterion, or references that do not fit.
+    """
+    if criterion not in ("d", "a", "e", "mac"):
+        raise LabError(f"criterion is {criterion!r}; expected d, a, e or mac for the target modes")
+    require_number("sensor", n_sensors, sensors)
+    _require_references(n_sensors, setups, references)
+    total = references + setups * (n_sensors - references)
+    require_number("sensor", total, sensors)
+    _require_one_quantity(rig, sensors, noise)
+    omega, shapes = normal_modes(rig)
+    n_channels = sum(sorted(len(own) for own in sensors.channels)[::-1][:total])
+    m = min(n_channels, len(omega)) if n_modes is None else n_modes
+    if not 1 <= m <= min(n_channels, len(omega)):
+        raise LabError(
+            f"{m} modes asked for, with {n_channels} channels and {len(omega)} modes of the structure; expected 1 to "
+            f"{min(n_channels, len(omega))}"
+        )
+    omega, shapes = omega[:m], shapes[:, :m]
+    blocks = sensors.padded(sensor_shapes(rig, omega, shapes, noise or {}))
+    grams = np.einsum("bcm,bcn->bmn", blocks, blocks)
+    rule = CRITERIA[criterion]
+    fixed = sensors.fixed
+    stay: tuple[int, ...] = ()
+    if setups > 1:
+        stay = choose(grams, references, CRITERIA["visibility"], fixed=fixed[:references], limit=limit).chosen
+        fixed = tuple(sorted({*fixed, *stay}))
+    found = choose(grams, total, rule, fixed=fixed, limit=limit)
+    if not np.isfinite(found.score) or not np.isfinite(rule.figure(np.array(found.score))):
+        raise LabError(
+            f"{total} sensors among these {len(sensors)} candidates cannot tell {m} modes apart; ask for fewer modes, or "
+            "allow more places"
+        )
+    inputs = choose_actuators(rig, actuators, n_actuators, n_modes=m, limit=limit)
+    momenta = sensors.padded(motion_rows(rig) @ rig.second_order().mass @ shapes)
+    rules = _rules(blocks, grams, momenta, total, sensors, found.chosen, rule)
+    named = actuators.named(inputs)
+    ranking = [_ranked(name, grams, chosen, rule, found, sensors, named) for name, chosen in rules.items()]
+    if planned is not None:
+        ranking.append(
+            _ranked("planned", grams, planned[0], rule, found, sensors, actuators.named(planned[1]))
+        )
+    if len(found.layouts) > 1:
+        last = np.flatnonzero(np.isfinite(found.scores))[-1]
+        ranking.append(_ranked("worst", grams, found.layouts[last], rule, found, sensors, named))
+    arranged = _arranged(found.chosen, stay, setups)
+    shifts = _loading(rig, sensors, arranged, shapes, sensor_mass)
+    possible = found.scores[np.isfinite(found.scores)]
+    n_layouts = count(len(sensors), total, n_fixed=len(fixed))
+    return Placement(
+        "modes",
+        rig.name,
+        criterion,
+        rule.measure + (" [in noise]" if noise else ""),
+        sensors.named(found.chosen),
+        named,
+        float(rule.figure(np.array(found.score))),
+        found.proven,
+        None if found.ceiling is None else float(rule.figure(np.array(found.ceiling))),
+        n_layouts,
+        len(possible) if found.proven else n_layouts,
+        rule.figure(possible),
+        tuple(ranking),
+        setups=tuple(sensors.named(each) for each in arranged) if setups > 1 else (),
+        frequency_shifts=shifts,
+        warnings=tuple(_warnings(arranged, shifts, sensor_mass)),
+    )
+
+
+def _require_references(n_sensors: int, setups: int, references: int) -> None:
+    if setups < 1 or (setups == 1 and references):
+        raise LabError(
+            f"{setups} set-ups with {references} references; expected references only where there are several set-ups"
+        )
+    if setups > 1 and not 1 <= references < n_sensors:
+        raise LabError(
+            f"{references} of {n_sensors} sensors are references; expected 1 to {n_sensors - 1}, so that set-ups can be "
+            "joined and some sensors rove"
+        )
+
+
+def _require_one_quantity(rig: Rig, sensors: Candidates, noise: Mapping[str, float] | None) -> None:
+    units = sorted({rig.outputs[i].unit for own in sensors.channels for i in own})
+    if len(units) > 1 and not noise:
+        raise LabError(
+            f"the candidates read in {', '.join(units)}, which nothing makes comparable; give the noise of each, or one "
+            "quantity"
+        )
+
+
+def choose_actuators(
+    rig: Rig, actuators: Candidates, n: int, *, n_modes: int | None = None, limit: int = LIMIT
+) -> tuple[int, ...]:
+    """The actuators with which the force on the faintest of the lowest modes is largest; all modes when None."""
+    if not n:
+        return ()
+    require_number("actuator", n, actuators)
+    shapes = normal_modes(rig)[1][:, :n_modes]
+    participation = actuators.padded((shapes.T @ force_columns(rig)).T)
+    # Each mode in units of what all actuators together do to it.
+    size = np.sqrt(np.sum(participation**2, axis=(0, 1)))
+    participation = participation / np.where(size > 0, size, 1.0)
+    grams = np.einsum("bcm,bcn->bmn", participation, participation)
+    return choose(grams, n, CRITERIA["visibility"], fixed=actuators.fixed, limit=limit).chosen
+
+
+def _rules(
+    blocks: Array,
+    grams: Array,
+    momenta: Array,
+    n: int,
+    sensors: Candidates,
+    best: tuple[int, ...],
+    rule: Criterion,
+) -> dict[str, tuple[int, ...]]:
+    """Layouts by the classical rules beside the best."""
+    return {
+        "best": best,
+        "effective independence": effective_independence(blocks, n, fixed=sensors.fixed),
+        "kinetic energy": kinetic_energy(blocks, momenta, n, fixed=sensors.fixed),
+        "greedy": greedy(grams, n, rule, fixed=sensors.fixed),
+    }
+
+
+def _ranked(
+    name: str,
+    grams: Array,
+    chosen: Sequence[int],
+    rule: Criterion,
+    found: Choice,
+    sensors: Candidates,
+    actuators: tuple[str, ...],
+) -> Ranked:
+    """A layout with its figures by every criterion."""
+    G = grams[list(chosen)].sum(axis=0)[None]
+    score = float(rule.score(G)[0])
+    slack = SAME * max(abs(score), 1e-300) if np.isfinite(score) else 0.0
+    rank = int(np.sum(found.scores > score + slack)) + 1 if len(found.scores) else None
+    details = {
+        each.name: float(each.figure(each.score(G))[0])
+        for each in CRITERIA.values()
+        if each.name != "visibility"
+    }
+    return Ranked(name, sensors.named(chosen), actuators, details[rule.name], rank, details)
+
+
+def _arranged(chosen: Sequence[int], stay: Sequence[int], setups: int) -> list[tuple[int, ...]]:
+    """Sensors of each set-up, references first."""
+    rest = [i for i in chosen if i not in stay]
+    per = len(rest) // setups
+    return [(*stay, *rest[k * per : (k + 1) * per]) for k in range(setups)]
+
+
+def _loading(
+    rig: Rig, sensors: Candidates, arranged: list[tuple[int, ...]], shapes: Array, mass: float
+) -> tuple[float, ...]:
+    if not mass:
+        return ()
+    if not mass > 0:
+        raise LabError(f"the mass of a sensor is {mass} kg; expected a positive number")
+    s = rig.second_order()
+    shifts = [
+        frequency_shifts(
+            s.mass,
+            s.stiffness,
+            shapes,
+            added_mass(rig, [rig.outputs[i].name for i in sensors.channels_of(each)], mass),
+        )
+        for each in arranged
+    ]
+    return tuple(float(x) for x in np.min(shifts, axis=0))
+
+
+def _warnings(arranged: list[tuple[int, ...]], shifts: Sequence[float], mass: float) -> list[str]:
+    told = []
+    if shifts and min(shifts) < -1e-3:
+        told.append(
+            f"sensors of {mass:g} kg lower the frequency of mode {int(np.argmin(shifts)) + 1} by {-100 * min(shifts):.2g} %"
+            + (", and by another share in every set-up" if len(arranged) > 1 else "")
+            + "; use lighter ones, or put their mass into the model"
+        )
+    return told
