@@ -47,14 +47,17 @@ def normal_equations(
     gradient = np.zeros(len(dw_next))
     information = np.zeros((len(dw_next), len(dw_next)))
     for first in range(0, run.outputs.shape[1], BLOCK):
-        u, y = run.inputs[:, first : first + BLOCK], run.outputs[:, first : first + BLOCK]
+        where = slice(first, first + BLOCK)
+        u = run.inputs[:, where]
         w, w_next = _states(T, B @ u, w_next)
         forcing = np.zeros((len(dw_next), n, u.shape[1]), dtype=complex)
         forcing[: len(dA)] = dA @ w + dB @ u
         dw, dw_next = _states(T, forcing, dw_next)
         J = np.real(C @ dw)  # (n_parameters, n_outputs, n_samples)
         J[: len(dA)] += np.real(dC @ w) + tangent.D_theta[:, :, run.active] @ u
-        e = y - np.real(C @ w) - system.D[:, run.active] @ u
+        if run.missing is not None:
+            J[:, run.missing[:, where]] = 0
+        e = run.errors(np.real(C @ w) + system.D[:, run.active] @ u, where)
         WJ = weights[:, None] * J
         gradient += np.tensordot(WJ, e, 2)
         information += np.tensordot(WJ, J, ((1, 2), (1, 2)))

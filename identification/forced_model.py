@@ -26,7 +26,8 @@ class ForcedModel(NamedTuple):
 
     Attributes:
         system: two states per mode, sampled.
-        residuals: measured minus simulated outputs of each record, shape (n_outputs, n_samples).
+        residuals: measured minus simulated outputs of each record, shape (n_outputs, n_samples); zero where nothing
+            was measured.
         n_unknowns: numbers fitted: poles, shapes, participation, direct terms and initial states.
         spread: how the model moves along independent directions, by one standard deviation along each; None where it
             is not at a maximum of the likelihood, or the data do not determine it.
@@ -82,7 +83,7 @@ def forced_model(recording: Recording, modes: Modes, *, likeliest: bool = False)
         q, spread = optimum.q, _spread(problem, optimum)
     system = problem.tangent(q).system
     fitted = simulated(system, problem.runs, problem.initial(q))
-    residuals = tuple(run.outputs - y for run, y in zip(problem.runs, fitted, strict=True))
+    residuals = tuple(run.errors(y) for run, y in zip(problem.runs, fitted, strict=True))
     return ForcedModel(system, residuals, q.size, spread)
 
 
@@ -92,7 +93,7 @@ def _spread(problem: OutputError, optimum: Optimum) -> Tangent | None:
     if not optimum.converged or blind.shape[1]:
         return None
     # What the fit has absorbed of the noise is given back.
-    absorbed = problem.n_unknowns / (float(np.sum(problem.n_samples)) * len(problem.outputs))
+    absorbed = problem.n_unknowns / float(np.sum(problem.n_samples))
     variance, V = np.linalg.eigh(covariance / (1 - absorbed))
     moves = V * np.sqrt(np.maximum(variance, 0))  # (n_theta, n_directions)
     tangent = problem.tangent(optimum.q)

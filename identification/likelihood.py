@@ -15,6 +15,7 @@ from identification.error_bars import covariance_of, delta_method, spread
 from identification.errors import TooShortError
 from identification.families import Model, family
 from identification.modal_parameters import ModalParameters
+from identification.modal_responses import Run
 from identification.modes import Modes
 from identification.output_error import OutputError, output_error, simulated
 from identification.parameterizations import Parameterization
@@ -92,7 +93,7 @@ def refine(
     """The maximum-likelihood estimate near a start from any other method, with standard deviations.
 
     Args:
-        recording: records with measured inputs, or free decays.
+        recording: records with measured inputs, or free decays; samples of the outputs may be missing (NaN).
         start: M, C, K; a state space or realization; modes; or parameters of `parameterization`.
         parameterization: what may vary. When None: every entry of symmetric M, C, K for a structure; poles,
             shapes and participation for the others. A realization and the parameterization of a structure go
@@ -105,7 +106,7 @@ def refine(
         The estimate; look at `converged`, `whiteness` and `notes` before relying on it.
 
     Raises:
-        RecordingError: samples are missing or a record has nothing that drives the model.
+        RecordingError: samples of an input are missing or a record has nothing that drives the model.
         NotSecondOrderError: the channels do not fit the structure.
         IdentificationError: the start does not fit, is unstable, or has more parameters than there are samples.
 
@@ -144,7 +145,7 @@ def _with_best_linear(problem: OutputError, parameterization: Parameterization, 
 
 def _estimate(problem: OutputError, optimum: Optimum, noise: Noise, notes: tuple[str, ...]) -> Estimate:
     """The optimum in the words of the user."""
-    n_values = float(np.sum(problem.n_samples)) * len(problem.outputs)
+    n_values = float(np.sum(problem.n_samples))
     variance = noise.variance(optimum.squares)
     # What the fit has absorbed of the noise is given back, to the noise and to the scatter.
     absorbed = 1 - problem.n_unknowns / n_values
@@ -152,7 +153,7 @@ def _estimate(problem: OutputError, optimum: Optimum, noise: Noise, notes: tuple
     structure, modes = spread(problem, optimum.q, covariance, blind)
     system, initial = problem.tangent(optimum.q).system, problem.initial(optimum.q)
     predictions = simulated(system, problem.runs, initial)
-    white = whiteness([run.outputs - y for run, y in zip(problem.runs, predictions, strict=True)])
+    white = whiteness([_left(run, y) for run, y in zip(problem.runs, predictions, strict=True)])
     return Estimate(
         problem.parameterization.names,
         optimum.q[: problem.n_theta],
@@ -169,6 +170,12 @@ def _estimate(problem: OutputError, optimum: Optimum, noise: Noise, notes: tuple
         optimum.n_iterations,
         notes + _notes(problem, optimum, blind, white),
     )
+
+
+def _left(run: Run, predicted: Array) -> Array:
+    """What the model leaves of the outputs, NaN where samples are missing."""
+    e = run.errors(predicted)
+    return e if run.missing is None else np.where(run.missing, np.nan, e)
 
 
 def _notes(problem: OutputError, optimum: Optimum, blind: Array, white: Array) -> tuple[str, ...]:
@@ -193,7 +200,7 @@ def _notes(problem: OutputError, optimum: Optimum, blind: Array, white: Array) -
 
 
 def _require_enough_samples(problem: OutputError) -> None:
-    n_values = int(np.sum(problem.n_samples)) * len(problem.outputs)
+    n_values = int(np.sum(problem.n_samples))
     if n_values <= problem.n_unknowns:
         raise TooShortError(
             f"{n_values} samples cannot determine {problem.n_unknowns} unknowns; lengthen the records or fit fewer "

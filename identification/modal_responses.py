@@ -32,14 +32,23 @@ class Run(NamedTuple):
     Attributes:
         inputs: those that act at all, shape (n_active, n_samples).
         active: their positions among the input channels.
-        outputs: shape (n_outputs, n_samples).
+        outputs: shape (n_outputs, n_samples), zero where missing.
         dt: sample time [s].
+        missing: which samples of the outputs are, shape (n_outputs, n_samples); None where none is.
     """
 
     inputs: Array
     active: NDArray[np.intp]
     outputs: Array
     dt: float
+    missing: NDArray[np.bool_] | None = None
+
+    def errors(self, predicted: Array, where: slice = slice(None)) -> Array:
+        """Measured minus predicted outputs over a stretch, zero where nothing was measured."""
+        e = self.outputs[:, where] - predicted
+        if self.missing is not None:
+            e[self.missing[:, where]] = 0
+        return np.asarray(e)
 
 
 class Spectrum(NamedTuple):
@@ -122,18 +131,27 @@ def normal_equations(
     pairs = close_pairs(modes, tangent.system.dt, run)
     G: Array = np.zeros(())  # products of the signals among themselves, (n_signals, n_signals)
     V: Array = np.zeros(())  # and with the residuals, (n_signals, n_outputs)
+    unseen: Array | None = None  # what G would be over the samples missing, (n_outputs, n_signals, n_signals)
     for where, X in _signals(tangent.system, modes, run, initial is not None, pairs):
-        residual = run.outputs[:, where] - predict @ X[: predict.shape[1]]
         G = G + X @ X.T
-        V = V + X @ residual.T
+        V = V + X @ run.errors(predict @ X[: predict.shape[1]], where).T
+        if run.missing is not None:
+            unseen = _squares_at(X, run.missing[:, where], unseen)
     n = tangent.n_parameters + (0 if initial is None else tangent.system.n_states)
     gradient, information = np.zeros(n), np.zeros((n, n))
     for o, T in enumerate(_coefficients(tangent, modes, run, initial, pairs)):
         # The shape at one output does not move the others.
         rows = np.flatnonzero(np.any(T, axis=1))
         gradient[rows] += weights[o] * (T[rows] @ V[:, o])
-        information[np.ix_(rows, rows)] += weights[o] * (T[rows] @ G @ T[rows].T)
+        seen = G if unseen is None else G - unseen[o]
+        information[np.ix_(rows, rows)] += weights[o] * (T[rows] @ seen @ T[rows].T)
     return gradient, information
+
+
+def _squares_at(X: Array, missing: NDArray[np.bool_], before: Array | None) -> Array:
+    """Products of signals over the samples that each output misses, added to those of earlier blocks."""
+    products = np.stack([X[:, gone] @ X[:, gone].T for gone in missing])
+    return products if before is None else before + products
 
 
 def close_pairs(modes: Spectrum, system_dt: float, run: Run) -> Pairs:

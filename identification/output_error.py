@@ -52,8 +52,19 @@ class OutputError:
 
     @property
     def n_samples(self) -> Array:
-        """Samples of each record, shape (n_records, 1)."""
-        return np.array([[float(run.outputs.shape[1])] for run in self.runs])
+        """Samples measured in each record and output, shape (n_records, n_outputs)."""
+        missing = (0 if run.missing is None else np.sum(run.missing, axis=1) for run in self.runs)
+        whole = ((len(self.outputs), run.outputs.shape[1]) for run in self.runs)
+        return np.stack(
+            [np.full(n, float(size)) - gone for (n, size), gone in zip(whole, missing, strict=True)]
+        )
+
+    @property
+    def power(self) -> Array:
+        """Mean square of each record and output, shape (n_records, n_outputs); the largest one for a silent output."""
+        squares = np.stack([np.sum(run.outputs**2, axis=1) for run in self.runs])
+        power = squares / np.maximum(self.n_samples, 1)
+        return np.where(power > 0, power, np.max(power))
 
     def initial(self, q: Array) -> list[Array | None]:
         """The initial state of each record, None for rest."""
@@ -74,7 +85,7 @@ class OutputError:
         poles = np.linalg.eigvals(system.A)
         size = np.maximum(np.abs(poles), np.finfo(float).tiny)
         rate = np.log(size) if system.dt else poles.real * self.runs[0].dt
-        return float(np.max(rate, initial=-np.inf) * np.max(self.n_samples))
+        return float(np.max(rate, initial=-np.inf) * max(run.outputs.shape[1] for run in self.runs))
 
     def squares(self, q: Array) -> Array:
         """Sum of squared errors of each record and output, (n_records, n_outputs); infinite without a model."""
@@ -86,7 +97,7 @@ class OutputError:
             return np.full((len(self.runs), len(self.outputs)), np.inf)
         predictions = simulated(self.tangent(q).system, self.runs, self.initial(q))
         return np.stack(
-            [np.sum((run.outputs - y) ** 2, axis=1) for run, y in zip(self.runs, predictions, strict=True)]
+            [np.sum(run.errors(y) ** 2, axis=1) for run, y in zip(self.runs, predictions, strict=True)]
         )
 
     def normal_equations(self, q: Array, weights: Array) -> tuple[Array, Array]:
@@ -123,19 +134,19 @@ def output_error(
     """The fitting problem of a recording.
 
     Args:
-        recording: records with inputs, or free decays.
+        recording: records with inputs, or free decays. Samples of the outputs may be missing (NaN) and count for nothing.
         parameterization: the family of models.
         theta: any parameters in it, to see how many states it has.
         initial_state: `rest`, `free`, or `auto` for free in free decays only.
 
     Raises:
         IdentificationError: there is no model at θ.
-        RecordingError: samples are missing, a record has neither inputs nor a free initial state, the model is
+        RecordingError: samples of an input are missing, a record has neither inputs nor a free initial state, the model is
             sampled at another rate, or `initial_state` is unknown.
     """
     if initial_state not in ("auto", "rest", "free"):
         raise RecordingError(f"initial_state is {initial_state!r}; expected auto, rest or free")
-    recording.require_complete()
+    recording.require_complete(but_outputs=True)
     released = tuple(
         initial_state == "free" or (initial_state == "auto" and record.kind == "free_decay")
         for record in recording.records
@@ -150,7 +161,12 @@ def output_error(
             )
         active = np.flatnonzero(np.any(inputs, axis=1)) if inputs is not None else np.zeros(0, dtype=np.intp)
         forces = inputs[active] if inputs is not None else np.zeros((0, record.n_samples))
-        runs.append(Run(forces, active, np.asarray(record.outputs[:, :], dtype=float), recording.dt))
+        outputs = np.asarray(record.outputs[:, :], dtype=float)
+        missing = np.isnan(outputs)
+        if missing.any():
+            runs.append(Run(forces, active, np.where(missing, 0, outputs), recording.dt, missing))
+        else:
+            runs.append(Run(forces, active, outputs, recording.dt))
     try:
         system = parameterization.tangent(theta, recording.inputs, recording.outputs).system
     except np.linalg.LinAlgError as error:

@@ -262,11 +262,14 @@ class Recording:
             )
         return replace(self, records=tuple(records))
 
-    def require_complete(self) -> None:
+    def require_complete(self, *, but_outputs: bool = False) -> None:
         """Check that no sample is missing.
 
+        Args:
+            but_outputs: whether samples of the outputs may be missing (NaN, not infinite).
+
         Raises:
-            RecordingError: a sample is NaN or infinite; names the channel and the time.
+            RecordingError: a sample is NaN or infinite; names the channel and the first time.
         """
         for number, record in enumerate(self.records):
             first = 0
@@ -275,11 +278,11 @@ class Recording:
                     # A finite sum proves that all is finite, at a fraction of the cost of looking.
                     if np.isfinite(np.sum(block)):
                         continue
-                    bad = ~np.isfinite(block)
+                    bad = np.isinf(block) if but_outputs and channels is self.outputs else ~np.isfinite(block)
                     if not bad.any():
                         continue
-                    row = int(np.argmax(bad.any(axis=1)))
-                    sample = first + int(np.argmax(bad[row]))
+                    column = int(np.argmax(bad.any(axis=0)))
+                    row, sample = int(np.argmax(bad[:, column])), first + column
                     raise RecordingError(
                         f"channel {channels[row].name!r} of record {number} misses a sample at "
                         f"t = {sample / self.sample_rate:.6g} s ({int(bad.sum())} missing near there); "

@@ -64,7 +64,7 @@ def refinement(
         The estimate that was reached; where M, C, K cannot be fitted, that of the modes, which is then said.
 
     Raises:
-        RecordingError: forces were not measured, or samples are missing.
+        RecordingError: forces were not measured, or miss samples.
         IdentificationError: there is no mode, or the likelihood has no maximum nearby.
 
     Source: Ljung (1999), System Identification, 2nd ed., eq. (7.76) and section 10.2; whether the records begin at
@@ -116,7 +116,6 @@ def _matrices_of(found: Estimate, dofs: Sequence[str]) -> SecondOrder | None:
 
 
 def _require_forces(recording: Recording) -> None:
-    recording.require_complete()
     for number, record in enumerate(recording.records):
         if record.kind != "free_decay" and not record.inputs.shape[0]:
             raise RecordingError(

@@ -37,7 +37,7 @@ class Noise:
     """How noise variances follow from squared errors.
 
     Attributes:
-        n_samples: samples of each record, shape (n_records, 1).
+        n_samples: samples measured in each record and output, shape (n_records, n_outputs).
         floor: smallest variance, shape (n_records, n_outputs).
         per_record: whether each record has its own, or all share one for each output.
     """
@@ -49,8 +49,9 @@ class Noise:
     def variance(self, squares: Array) -> Array:
         """Variance of each record and output, shape (n_records, n_outputs)."""
         if self.per_record:
-            return squares / self.n_samples + self.floor
-        pooled = np.sum(squares + self.n_samples * self.floor, axis=0) / np.sum(self.n_samples)
+            return squares / np.maximum(self.n_samples, 1) + self.floor
+        total = np.sum(self.n_samples, axis=0)
+        pooled = np.sum(squares + self.n_samples * self.floor, axis=0) / np.maximum(total, 1)
         return np.broadcast_to(pooled, squares.shape)
 
     def cost(self, squares: Array) -> float:
@@ -116,10 +117,9 @@ class Curvature:
 
 def noise_model(problem: OutputError, *, per_record: bool) -> Noise:
     """The noise of a problem, with a floor relative to the size of each signal."""
-    power = np.stack([np.mean(run.outputs**2, axis=1) for run in problem.runs])
+    power = problem.power
     if not np.any(power):
         raise IdentificationError("all outputs are zero, so there is nothing to fit; check the recording")
-    power = np.where(power > 0, power, np.max(power))
     return Noise(problem.n_samples, PRECISION**2 * power, per_record)
 
 
@@ -216,9 +216,7 @@ def solve_linear(problem: OutputError, start: Array, which: NDArray[np.bool_]) -
         start: unknowns, shape (n_unknowns,).
         which: mask of the linear ones.
     """
-    power = np.stack([np.mean(run.outputs**2, axis=1) for run in problem.runs])
-    weights = 1 / np.where(power > 0, power, np.max(power))
-    gradient, information = problem.normal_equations(start, weights)
+    gradient, information = problem.normal_equations(start, 1 / problem.power)
     best = start.copy()
     best[which] += Curvature.of(information[np.ix_(which, which)]).solve(gradient[which])
     return best

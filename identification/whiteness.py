@@ -33,16 +33,20 @@ def whiteness(residuals: Sequence[Array], *, n_lags: int = 20) -> Array:
     model is right and the records are long against `n_lags`.
 
     Args:
-        residuals: one array per record, shape (n_outputs, n_samples).
+        residuals: one array per record, shape (n_outputs, n_samples); NaN where a sample is missing.
         n_lags: number of lags looked at, lowered where a record is shorter than five times as many samples.
 
-    Source: Ljung and Box (1978), Biometrika 65(2), statistic Q̃, summed over the records.
+    Source: Ljung and Box (1978), Biometrika 65(2), statistic Q̃, summed over the records; where samples are missing
+        each lag counts by the pairs that are left, as in Dunsmuir and Robinson (1981), J. Am. Stat. Assoc. 76, 560-568.
     """
     statistic, freedom = np.zeros(len(residuals[0])), 0
     for residual in residuals:
         n_samples = residual.shape[1]
         lags = np.arange(1, 1 + min(n_lags, n_samples // 5))
-        r = autocorrelation(residual, lags.size)
-        statistic += n_samples * (n_samples + 2) * np.sum(r**2 / (n_samples - lags), axis=1)
+        known = np.isfinite(residual)
+        n_known = np.sum(known, axis=1, keepdims=True)
+        pairs = np.maximum(autocorrelation(known, lags.size) * n_known, 1)
+        r = autocorrelation(np.where(known, residual, 0), lags.size)
+        statistic += np.sum(n_known * (n_known + 2) * r**2 / pairs, axis=1)
         freedom += lags.size
     return np.asarray(scipy.special.chdtrc(max(freedom, 1), statistic))

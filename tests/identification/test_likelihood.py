@@ -55,6 +55,47 @@ def worst(found, truth=TRUTH):
     )
 
 
+# --- Missing samples
+
+
+def with_gaps(recording, seed=0):
+    """A fifth of all samples of the outputs missing, one by one, and half of the last output at a stretch."""
+    rng, records = np.random.default_rng(seed), []
+    for record in recording.records:
+        y = np.where(rng.random(record.outputs.shape) < 0.2, np.nan, record.outputs)
+        y[-1, : record.n_samples // 2] = np.nan
+        records.append(replace(record, outputs=y))
+    return replace(recording, records=tuple(records))
+
+
+def test_exact_data_with_gaps_give_the_exact_structure():
+    found = refine(
+        with_gaps(random_recording()), moved(TRUTH, 0.02), parameterization=free_matrices(TRUTH.dofs)
+    )
+    assert found.converged
+    assert worst(found.second_order) < 1e-8  # as without gaps
+
+
+def test_gaps_widen_the_error_bars_to_the_bound_and_no_further():
+    level, clean = 0.05, random_recording(n_samples=800)
+    recording = with_gaps(with_noise(clean, level, seed=1))
+    found = refine(recording, TRUTH, parameterization=free_matrices(TRUTH.dofs))
+    std = level * np.sqrt(np.mean(np.square(clean.records[0].outputs), axis=1))
+    whole, bound = (cramer_rao_bound(TRUTH, each, noise_std=std) for each in (clean, recording))
+    # 640 and 320 samples know the noise to 4 %, and the bound moves with the estimate by some per cent.
+    np.testing.assert_allclose(found.noise_std[0], std, rtol=0.12)
+    upper = np.triu_indices(3)
+    for name in ("mass", "damping", "stiffness"):
+        own, least, complete = (
+            getattr(each.second_order, f"{name}_std")[upper] for each in (found, bound, whole)
+        )
+        np.testing.assert_allclose(own, least, rtol=0.2)
+        assert np.all(least > 1.05 * complete)  # a fifth of all samples alone makes 1 / √0.8 = 1.12
+        error = (getattr(found.second_order, name) - getattr(TRUTH, name))[upper]
+        assert np.all(np.abs(error) < 4.5 * own)  # one test of 15 000 has an entry beyond
+    assert np.all(found.whiteness > 1e-3)
+
+
 # --- Exact data
 
 

@@ -1,11 +1,12 @@
 """Every method by its name: what it accepts, what it refuses, and that it finds a structure."""
 
 import inspect
+from dataclasses import replace
 
 import numpy as np
 import pytest
 
-from identification.errors import IdentificationError
+from identification.errors import IdentificationError, RecordingError
 from identification.methods import METHODS, find_method, shows_rank
 from identification.recording import KINDS, Recording
 from identification.systems import Realization
@@ -118,3 +119,29 @@ def test_free_decays_are_realized_without_forces():
     )
     found = METHODS["era"](decays).system.modes()
     np.testing.assert_allclose(found.poles, chain3().modes().poles, rtol=1e-9)
+
+
+@pytest.mark.parametrize("place", [0, 150, -1], ids=["first", "within", "last"])
+@pytest.mark.parametrize("method", METHODS.values(), ids=METHODS)
+def test_a_missing_sample_is_told_or_left_out(method, place):
+    recording, _ = suited(method)
+    channel, record = recording.outputs[1], recording.records[0]
+
+    def with_value(value):
+        outputs = np.array(record.outputs)
+        outputs[1, place] = value
+        return replace(recording, records=(replace(record, outputs=outputs), *recording.records[1:]))
+
+    try:
+        found, told = method(with_value(np.nan), 6), ""
+    except RecordingError as error:
+        found, told = None, str(error)
+    if found is None:
+        # One line that names the channel and the time.
+        assert repr(channel.name) in told
+        assert f"t = {recording.dt * (place % record.n_samples):.6g} s" in told
+        assert "\n" not in told
+    else:
+        # Whatever was there has no say.
+        other = method(with_value(1e3), 6).system.modes()
+        np.testing.assert_array_equal(found.system.modes().poles, other.poles)

@@ -82,7 +82,16 @@ def plain_loop(tangent, run, initial):
 def expected_equations(tangent, run, initial, weights):
     y, J = plain_loop(tangent, run, initial)
     e = run.outputs - y
+    if run.missing is not None:
+        e, J = np.where(run.missing, 0, e), np.where(run.missing, 0, J)
     return np.einsum("o,pok,ok->p", weights, J, e), np.einsum("o,pok,qok->pq", weights, J, J)
+
+
+def with_gaps(run, rng):
+    """The run without some samples, and without a stretch of the first output."""
+    missing = rng.random(run.outputs.shape) < 0.1
+    missing[0, 20:70] = True
+    return run._replace(outputs=np.where(missing, 0, run.outputs), missing=missing)
 
 
 def assert_close(found, expected, rtol):
@@ -108,6 +117,18 @@ CASES = {
     "undamped": (3j, 7j),
     "slow": (-1e-3 + 0.01j, -0.1 + 8j),
 }
+
+
+@pytest.mark.parametrize("equations", [modal_responses, cascade])
+def test_missing_samples_count_for_nothing(equations):
+    rng = np.random.default_rng(6)
+    tangent = tangent_of(system_of(oscillators(*CASES["apart"]), 2, 3, rng), 4, rng)
+    run = with_gaps(run_of(tangent.system, 3000, rng), rng)  # several blocks of the cascade
+    x0, weights = rng.standard_normal(4), np.array([1.0, 2.0, 0.5])
+    spectra = (spectrum(tangent.system),) if equations is modal_responses else ()
+    found = equations.normal_equations(tangent, *spectra, run, x0, weights)
+    for ours, twin in zip(found, expected_equations(tangent, run, x0, weights), strict=True):
+        assert_close(ours, twin, 1e-10)  # as without gaps, with a longer sum
 
 
 @pytest.mark.parametrize("initial", [False, True], ids=["rest", "released"])

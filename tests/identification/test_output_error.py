@@ -84,6 +84,25 @@ def test_normal_equations_collect_all_records():
     np.testing.assert_allclose(information, J @ J.T, atol=1e-7 * np.abs(information).max())
 
 
+def test_missing_outputs_leave_the_sum():
+    outputs = np.array(RANDOM.records[0].outputs)
+    outputs[1, 7:60] = outputs[0, 3] = np.nan
+    gaps = output_error(
+        replace(RANDOM, records=(replace(RANDOM.records[0], outputs=outputs), RANDOM.records[1])),
+        FAMILY,
+        THETA,
+    )
+    assert gaps.n_samples.tolist() == [[149, 97], [90, 90]]
+    elsewhere = output_error(RANDOM, FAMILY, THETA)
+    q = 1.01 * THETA
+    errors = (
+        elsewhere.runs[0].outputs - simulated(elsewhere.tangent(q).system, elsewhere.runs, [None, None])[0]
+    )
+    expected = np.nansum(np.where(np.isnan(outputs), np.nan, errors) ** 2, axis=1)
+    np.testing.assert_allclose(gaps.squares(q)[0], expected, rtol=1e-12)  # sums in another order
+    np.testing.assert_allclose(gaps.squares(q)[1], elsewhere.squares(q)[1], rtol=1e-12)
+
+
 def test_growth_beyond_all_numbers_has_infinite_squares():
     problem = output_error(RANDOM, FAMILY, THETA)
     assert problem.grows(THETA) < 0
@@ -100,10 +119,13 @@ def test_what_cannot_be_fitted():
         output_error(ambient, FAMILY, THETA)
     with pytest.raises(RecordingError, match="initial_state is 'unknown'; expected auto, rest or free"):
         output_error(RANDOM, FAMILY, THETA, initial_state="unknown")
-    holes = np.array(RANDOM.records[0].outputs)
-    holes[1, 7] = np.nan
-    with pytest.raises(RecordingError, match="misses a sample"):
-        output_error(replace(RANDOM, records=(replace(RANDOM.records[0], outputs=holes),)), FAMILY, THETA)
+    for side, value in (("inputs", np.nan), ("outputs", np.inf)):
+        broken = np.array(getattr(RANDOM.records[0], side))
+        broken[1, 7] = value
+        with pytest.raises(RecordingError, match=r"of record 0 misses a sample at t = 0\.35 s"):
+            output_error(
+                replace(RANDOM, records=(replace(RANDOM.records[0], **{side: broken}),)), FAMILY, THETA
+            )
     family = modal_parameters(SYSTEM, inputs=SYSTEM.inputs)
     with pytest.raises(RecordingError, match="recording has 10 Hz and the start is sampled at 20 Hz"):
         output_error(replace(RANDOM, sample_rate=10.0), family, family.values)

@@ -31,6 +31,19 @@ def test_coloured_noise_is_found_out():
     assert p[1] < 1e-12
 
 
+def test_gaps_leave_the_probabilities_uniform():
+    rng = np.random.default_rng(3)
+    p = []
+    for _ in range(100):
+        e = rng.standard_normal((4, 2000))
+        e[:2, 500:1300] = np.nan  # a stretch
+        e[2:, ::3] = np.nan  # every third sample, which leaves a third of the pairs or all that are left
+        p.append(whiteness([e]))
+    for rows in (np.ravel([x[:2] for x in p]), np.ravel([x[2:] for x in p])):
+        # 200 values: as above.
+        assert scipy.stats.kstest(rows, "uniform").pvalue > 1e-3
+
+
 def test_nothing_left_is_white():
     assert whiteness([np.zeros((1, 100))])[0] == 1
     assert whiteness([np.ones((1, 3))])[0] == 1  # too short to say anything
