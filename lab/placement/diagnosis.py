@@ -14,7 +14,7 @@ from lab.placement.candidates import Candidates, require_number
 from lab.placement.confusion import confusion, lengths_and_cosines, without
 from lab.placement.modes import choose_actuators
 from lab.placement.outcome import CauseFigure, Drive, Placement, Ranked
-from lab.placement.plan import Plan, alternatives, driving_level, peak
+from lab.placement.plan import Plan, alternatives, driving_level, peak, total_duration
 from lab.placement.search import count
 from lab.placement.suspects import Suspects, suspects
 from lab.rig import Rig
@@ -264,18 +264,18 @@ def _groups(arena: Arena) -> Iterator[tuple[str, ...]]:
 def _drives(rig: Rig, plan: Plan, arena: Arena, std: Array, channels: Sequence[int]) -> Iterator[Drive]:
     """Other signals, and other levels of the planned one; causes of the same physical size, noise as planned."""
 
-    def figure(other: Plan) -> float:
+    def drive(name: str, other: Plan) -> Drive:
         found = suspects(rig, other, like=arena.suspects)
         products = _products(found, std, arena.sizes)
-        return replace(arena, suspects=found, products=products).figure(channels)
+        value = replace(arena, suspects=found, products=products).figure(channels)
+        signals = other.signals(rig)
+        return Drive(name, total_duration(signals, other.sample_rate), peak(signals), value)
 
     for kind, other in alternatives(rig, plan, rig.second_order().modes().frequency_hz):
-        yield Drive(kind, peak(other.signals(rig)), figure(other))
+        yield drive(kind, other)
     for level in LEVELS:
         other = plan.driven(driving_level(plan.excitation, level))
-        yield Drive(
-            f"{plan.excitation.kind} as planned, times {level:g}", peak(other.signals(rig)), figure(other)
-        )
+        yield drive(f"{plan.excitation.kind} as planned, times {level:g}", other)
 
 
 def _warnings(
