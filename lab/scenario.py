@@ -6,6 +6,7 @@ import dataclasses
 import json
 import tomllib
 from collections.abc import Mapping
+from functools import cache
 from pathlib import Path
 from typing import Annotated, Any, Literal, get_args
 
@@ -269,9 +270,15 @@ def _chosen(table: Mapping[str, Any], name: str, key: str, known: Mapping[str, t
     # As JSON, a list may stand for a tuple while text still does not stand for a number.
     text = json.dumps(settings, default=str)
     try:
-        return TypeAdapter(known[kind]).validate_json(text, strict=True)
+        return _adapter(known[kind]).validate_json(text, strict=True)
     except ValidationError as error:
         raise StudyError(explain(error, name)) from None
+
+
+@cache
+def _adapter(kind: type) -> TypeAdapter[Any]:
+    """Built once for each class, which takes longer than many a check."""
+    return TypeAdapter(kind)
 
 
 def explain(error: ValidationError, *inside: str, model: type[BaseModel] = Scenario) -> str:
