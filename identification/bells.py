@@ -54,6 +54,9 @@ def find_bells(S: Array, U: Complex, *, factor: float, min_mac: float) -> list[B
         factor: by which a peak must stand out.
         min_mac: least resemblance of the shape at a line with that of the peak.
 
+    Returns:
+        The bells, one per mode.
+
     Source: Brincker, Ventura and Andersen (2001), Proc. 19th IMAC, for the lines of one shape; Zhang, Wang
         and Tamura (2010), Mech. Syst. Signal Process. 24, 1227-1239, for the spectrum φᴴ G φ.
     """
@@ -136,6 +139,9 @@ def bell_pole(bell: Bell, n_transform: int, dt: float, lag_window: Array) -> com
         n_transform: length of that transform, twice that of a piece.
         dt: sample time [s].
         lag_window: as of `CrossSpectra.lag_window`.
+
+    Returns:
+        A complex number with a positive imaginary part.
 
     Source: Brincker, Ventura and Andersen (2001), Proc. 19th IMAC, damping estimation by frequency domain
         decomposition; the window as in Jacobsen, Andersen and Brincker (2008), Proc. 26th IMAC.

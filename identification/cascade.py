@@ -23,7 +23,16 @@ BLOCK = 1 << 10
 
 
 def simulate(system: StateSpace, run: Run, initial: Array | None) -> Array:
-    """Outputs under the inputs of the run and from the initial state, shape (n_outputs, n_samples)."""
+    """Outputs under the inputs of the run and from the initial state, shape (n_outputs, n_samples).
+
+    Args:
+        system: sampled, or continuous and held over each sample.
+        run: the record; its outputs do not matter.
+        initial: state at the first sample; rest when None.
+
+    Returns:
+        Shape (n_outputs, n_samples).
+    """
     system = system if system.dt else system.sampled(run.dt)
     T, Z = scipy.linalg.schur(system.A, output="complex")
     start = np.zeros(system.n_states) if initial is None else initial
@@ -34,7 +43,16 @@ def simulate(system: StateSpace, run: Run, initial: Array | None) -> Array:
 def normal_equations(
     tangent: Tangent, run: Run, initial: Array | None, weights: Array
 ) -> tuple[Array, Array]:
-    """Jᵀ W e and Jᵀ W J, as `modal_responses.normal_equations` gives them."""
+    """Jᵀ W e and Jᵀ W J, as `modal_responses.normal_equations` gives them.
+
+    Args:
+        tangent, run, initial, weights: as for `modal_responses.normal_equations`.
+
+    Returns:
+        Shapes (n,) and (n, n).
+
+    Source: as for `modal_responses.normal_equations`.
+    """
     tangent = tangent if tangent.system.dt else _sampled(tangent, run.dt)
     system = tangent.system
     n, extra = system.n_states, 0 if initial is None else system.n_states

@@ -103,6 +103,14 @@ class Difference(NamedTuple):
 def difference(a: Poles, b: Poles, limits: Thresholds) -> Difference:
     """How far the poles `a` are from the poles `b`.
 
+    Args:
+        a: poles of one order.
+        b: poles of another one.
+        limits: what is allowed.
+
+    Returns:
+        Differences in parts of what is allowed, and the distance, shape (n_a, n_b) each.
+
     Source: the distance is that of Reynders, Houbrechts and De Roeck (2012), Mech. Syst. Signal Process. 29,
         |λ_a - λ_b| / |λ| + 1 - MAC, with each part divided by what is allowed.
     """
@@ -160,6 +168,12 @@ def keep_long(cluster: Indices) -> Indices:
     short ones holds an empty cluster besides: where nothing agrees by chance, it must not take the shorter
         modes.
 
+    Args:
+        cluster: number of the cluster of each pole, -1 for none, shape (n_poles,).
+
+    Returns:
+        Shape (n_poles,).
+
     Source: two-means clustering as in Reynders, Houbrechts and De Roeck (2012), third stage.
     """
     if not np.any(cluster >= 0):
@@ -177,7 +191,15 @@ def keep_long(cluster: Indices) -> Indices:
 
 
 def cluster_means(poles: Poles, cluster: Indices) -> Poles:
-    """The mean of each cluster, with its highest order; shapes are turned to the phase of that one first."""
+    """The mean of each cluster, with its highest order; shapes are turned to the phase of that one first.
+
+    Args:
+        poles: all poles, by rising order.
+        cluster: number of the cluster of each pole, -1 for none, shape (n_poles,).
+
+    Returns:
+        One pole per cluster, with a shape of length one.
+    """
     member = np.flatnonzero(cluster >= 0)
     own = cluster[member]
     n = int(np.max(own, initial=-1)) + 1
@@ -197,7 +219,15 @@ def cluster_means(poles: Poles, cluster: Indices) -> Poles:
 
 
 def cluster_scatter(values: Array, cluster: Indices) -> Array:
-    """Standard deviation of the values in each cluster of two or more, shape (n_clusters,)."""
+    """Standard deviation of the values in each cluster of two or more, shape (n_clusters,).
+
+    Args:
+        values: one per pole, shape (n_poles,).
+        cluster: number of the cluster of each pole, -1 for none, shape (n_poles,).
+
+    Returns:
+        In the unit of the values.
+    """
     own, values = cluster[cluster >= 0], values[cluster >= 0]
     size = np.bincount(own)
     mean = np.bincount(own, values) / size

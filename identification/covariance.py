@@ -78,6 +78,13 @@ def output_covariances(
 def reference_rows(recording: Recording, references: Sequence[str] | None) -> NDArray[np.intp]:
     """Rows of the reference outputs.
 
+    Args:
+        recording: whose outputs they are.
+        references: their names; all outputs when None.
+
+    Returns:
+        Shape (n_references,).
+
     Raises:
         RecordingError: a name is not among the outputs, appears twice, or none was given.
     """

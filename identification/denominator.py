@@ -103,6 +103,12 @@ def coefficients(R: Array, n_inputs: int, degree: int) -> Array:
         R: factor of `reduced_factor`, for this degree or a higher one.
         n_inputs: size of a coefficient.
         degree: q.
+
+    Returns:
+        Real matrices.
+
+    Source: Guillaume, Verboven, Vanlanduit, Van der Auweraer and Peeters (2003), Proc. 21st IMAC, the reduced
+        normal equations, with the last coefficient as the unit matrix.
     """
     n = degree * n_inputs
     lhs, rhs = R[:n, :n], -R[:n, -n_inputs:]
@@ -116,6 +122,9 @@ def coefficients(R: Array, n_inputs: int, degree: int) -> Array:
 
 def zeros(A: Array) -> tuple[Complex, Complex]:
     """Points z with wᵀ D(z) = 0 and those w, one of each conjugate pair, for D = I + A_1 z + … + A_q z^q.
+
+    Args:
+        A: the coefficients A_1, …, A_q, shape (q, n_inputs, n_inputs).
 
     Returns:
         z, shape (n,), those with a positive imaginary part and the real ones, and w, shape (n, n_inputs).

@@ -214,6 +214,14 @@ def _svd(H: Array) -> tuple[Array, Array, Array]:
 def hankel_size(markov: MarkovParameters, n_rows: int | None, n_columns: int | None) -> tuple[int, int]:
     """Block rows and columns: as asked, or such that all lags are used at a bearable cost.
 
+    Args:
+        markov: the responses.
+        n_rows: as asked; None to choose.
+        n_columns: likewise.
+
+    Returns:
+        Block rows and block columns.
+
     Raises:
         TooShortError: too few lags.
         IdentificationError: no inputs or no outputs.
@@ -243,6 +251,15 @@ def settle_orders(
     markov: MarkovParameters, H: Decomposition, order: int | None, orders: Iterable[int] | None
 ) -> tuple[int, list[int], tuple[str, ...]]:
     """The order (chosen when None), all orders to realize by rising size, and the reason for the choice.
+
+    Args:
+        markov: the responses.
+        H: the Hankel matrix in its singular values.
+        order: as asked; None to choose.
+        orders: further ones.
+
+    Returns:
+        The order, all orders, and sentences on the choice.
 
     Raises:
         OrderError: an order exceeds the numerical rank.

@@ -50,6 +50,8 @@ def covariance_of(information: Array, n_parameters: int) -> tuple[Array, Array]:
 
     Returns:
         Shapes (n_parameters, n_parameters) and (n_parameters, n_blind).
+
+    Source: Kay (1993), Fundamentals of Statistical Signal Processing I, eq. (3.20).
     """
     curvature = Curvature.of(information)
     seen, V = curvature.seen, curvature.eigenvectors[:n_parameters]
@@ -69,6 +71,11 @@ def spread(
         q: unknowns.
         covariance: of the parameters.
         blind: combinations of parameters that are not known at all, in columns.
+
+    Returns:
+        The structure or None, and the modes.
+
+    Source: as for `delta_method` and `modes_with_std`.
     """
     theta, family_of_models = q[: problem.n_theta], problem.parameterization
     structure = None

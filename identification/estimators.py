@@ -38,6 +38,12 @@ class Moments(NamedTuple):
 def h1(moments: Moments) -> Complex:
     """H = Y Uᴴ (U Uᴴ)⁻¹: least squares with the error on the outputs, shape (n_frequencies, n_outputs, n_inputs).
 
+    Args:
+        moments: of inputs and outputs.
+
+    Returns:
+        Responses in the unit of the output per unit of the input.
+
     Source: Bendat and Piersol (2010), Random Data, eq. (7.62); Rocklin, Crowley and Vold (1985), Proc. 3rd
         IMAC, 272-278.
     """
@@ -50,6 +56,9 @@ def h2(moments: Moments) -> Complex:
     The row (H, -1) is the one that the moments of inputs and output make smallest, per power of the error.
     For each output, what it does not explain of the inputs, S = U Uᴴ - U Yᴴ (Y Yᴴ)⁻¹ Y Uᴴ, has the
     direction of H for its least eigenvector.
+
+    Args:
+        moments: of inputs and outputs.
 
     Returns:
         Shape (n_frequencies, n_outputs, n_inputs).
@@ -67,6 +76,9 @@ def hv(moments: Moments) -> Complex:
 
     The geometric mean of H1 and H2 for one input. For several it is the least eigenvector of the moments of
     all inputs with one output, each divided by its power.
+
+    Args:
+        moments: of inputs and outputs.
 
     Returns:
         Shape (n_frequencies, n_outputs, n_inputs).
@@ -90,6 +102,12 @@ ESTIMATORS: dict[str, Callable[[Moments], Complex]] = {"H1": h1, "H2": h2, "Hv":
 def multiple_coherence(moments: Moments) -> Array:
     """Share of each output's power that the inputs explain, 0 to 1, shape (n_frequencies, n_outputs).
 
+    Args:
+        moments: of inputs and outputs.
+
+    Returns:
+        Zero for an output that does not move.
+
     Source: Bendat and Piersol (2010), Random Data, eq. (7.35) and (7.36).
     """
     share = _explained(moments) / np.where(moments.yy > 0, moments.yy, 1)
@@ -102,6 +120,9 @@ def residual_variance(moments: Moments, n_averages: float) -> Array:
     Args:
         moments: sums over the pieces.
         n_averages: number of independent pieces, more than there are inputs.
+
+    Returns:
+        In the square of the unit of H.
 
     Source: Bendat and Piersol (2010), Random Data, eq. (9.99), as the covariance of least squares.
     """
@@ -116,6 +137,9 @@ def line_weight(moments: Moments) -> Array:
     Each input counts by its share of its own power. Where inputs are weak, or nearly copies of one another,
     the noise on the outputs comes out large.
 
+    Args:
+        moments: of inputs and outputs.
+
     Returns:
         Shape (n_frequencies,).
     """
@@ -127,7 +151,14 @@ def line_weight(moments: Moments) -> Array:
 
 
 def excited(moments: Moments) -> NDArray[np.bool_]:
-    """Lines at which every input acts by itself: with power to speak of, and not as a copy of the others."""
+    """Lines at which every input acts by itself: with power to speak of, and not as a copy of the others.
+
+    Args:
+        moments: of inputs and outputs.
+
+    Returns:
+        Shape (n_frequencies,).
+    """
     power = np.einsum("fii->fi", moments.uu).real
     floor = 1e-12 * np.max(power, axis=0, initial=0.0)
     acts = np.all((power > floor) & (power > 0), axis=1)

@@ -26,6 +26,9 @@ def family(
         recording: its channels and sample rate.
         parameterization: all entries of M, C, K for a structure, modal parameters for others, when None.
 
+    Returns:
+        The family, and θ, shape (n_parameters,).
+
     Raises:
         IdentificationError: the model is none of those, or does not fit the parameterization.
     """

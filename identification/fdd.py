@@ -153,6 +153,9 @@ def efdd(
         n_segment: as for `fdd`.
         min_mac: as for `fdd`.
 
+    Returns:
+        Models without inputs, whose outputs are those of the recording.
+
     Raises:
         OrderError: an odd order, or more modes than peaks.
         IdentificationError: no peak stands out.

@@ -76,6 +76,9 @@ def plscf_recording(
             most of the motion.
         n_lags: lags of the output correlations; likewise.
 
+    Returns:
+        Models of all orders, with the choices made in the notes.
+
     Raises:
         IdentificationError: as for `frequency_response`, `positive_spectra` and `plscf`.
 
@@ -171,6 +174,13 @@ def _output_response(
 def spread_references(recording: Recording, n: int) -> tuple[str, ...]:
     """Names of the n outputs whose cross-spectra with all outputs leave least of the others unexplained.
 
+    Args:
+        recording: whose outputs they are.
+        n: how many.
+
+    Returns:
+        The one that sees most first.
+
     Source: Businger and Golub (1965), Numer. Math. 7, 269-276, the pivots of an orthogonal factorization.
     """
     spectra = cross_spectra(recording)
@@ -185,6 +195,9 @@ def resonance_band(response: FrequencyResponse) -> tuple[float, float] | None:
 
     The power of all responses is averaged over so many lines that its scatter is below a tenth. It falls
     from the last resonance by a factor of three; twice the frequency where it does is the upper edge.
+
+    Args:
+        response: to forces, or positive spectra.
 
     Returns:
         Lowest and highest frequency [Hz], or None.

@@ -94,7 +94,15 @@ def shift_invariance(
 
 
 def numerical_rank(singular_values: Array, shape: tuple[int, int]) -> int:
-    """How many singular values of a matrix of that shape, largest first, stand above rounding."""
+    """How many singular values of a matrix of that shape, largest first, stand above rounding.
+
+    Args:
+        singular_values: largest first.
+        shape: of the matrix.
+
+    Returns:
+        At most their number.
+    """
     return int(
         np.sum(singular_values > np.finfo(float).eps * max(shape) * np.max(singular_values, initial=0.0))
     )

@@ -21,6 +21,14 @@ BATCH = 1 << 22
 def observability(A: Array, C: Array, n_rows: int) -> Array:
     """O = [C; CA; CA²; …], shape (n_rows * n_outputs, n_states).
 
+    Args:
+        A: shape (n_states, n_states).
+        C: shape (n_outputs, n_states).
+        n_rows: block rows.
+
+    Returns:
+        C A^k, one below the other.
+
     Raises:
         IdentificationError: it grows beyond all bounds.
 

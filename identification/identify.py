@@ -139,7 +139,14 @@ def identify(
 
 
 def choose_method(recording: Recording) -> tuple[str, str]:
-    """Name of the method that suits the records, and the reason."""
+    """Name of the method that suits the records, and the reason.
+
+    Args:
+        recording: of any kinds of records.
+
+    Returns:
+        A name in `METHODS`, and half a sentence.
+    """
     kinds = {record.kind for record in recording.records}
     if kinds == {"pulse"}:
         return "era", "since the response to a unit pulse is what it realizes"
@@ -179,6 +186,12 @@ def first_settled(stabilization: Stabilization) -> list[Placed]:
     """Where each mode stands at the lowest order at which it has settled.
 
     At higher orders poles of the noise come close to it, and to first order nothing is known of their effect.
+
+    Args:
+        stabilization: poles of all orders, and their clusters.
+
+    Returns:
+        One place per mode.
     """
     places = []
     for k in range(len(stabilization.modes)):

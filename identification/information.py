@@ -138,6 +138,9 @@ def predict(
         model, parameterization: as for `fisher_information`.
         recording: inputs, channels and sample rate.
         initial_states: states at the first samples, one per record; rest when None.
+
+    Returns:
+        The same channels, inputs and lengths.
     """
     state = "rest" if initial_states is None else "free"
     problem, q, _ = _experiment(model, recording, 1.0, parameterization, state, initial_states)

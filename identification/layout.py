@@ -47,6 +47,9 @@ def layout(
         inputs: channels; those without `dof` are left aside.
         dofs: names in the order wanted; first appearance among the outputs, then the inputs, when None.
 
+    Returns:
+        Who is instrumented, in the order of the degrees of freedom.
+
     Raises:
         NotSecondOrderError: a degree of freedom has neither sensor nor actuator, none has both, or a channel
             contradicts `dofs`; says what to add.

@@ -98,6 +98,9 @@ def layout_information(
         recording: planned (see `planned`), with every candidate input and output.
         parameterization: what is not known.
 
+    Returns:
+        Information of each output, for any choice of the inputs.
+
     Raises:
         IdentificationError: the model has no full set of eigenvectors, or does not fit the recording.
 

@@ -40,6 +40,9 @@ def fit_outputs(response: FrequencyResponse, states: Complex) -> OutputFit:
         response: H.
         states: X = (z I - A)⁻¹ B, shape (n_frequencies, n_states, n_inputs).
 
+    Returns:
+        C, D and what is left of each output.
+
     Source: Peeters and Van der Auweraer (2005), Proc. 1st IOMAC, eq. (9), with all poles of the polynomial
         in place of residual terms.
     """
@@ -53,7 +56,14 @@ def fit_outputs(response: FrequencyResponse, states: Complex) -> OutputFit:
 
 
 def line_weights(response: FrequencyResponse) -> Array:
-    """Weight of each line, equal where the response has none, shape (n_frequencies,)."""
+    """Weight of each line, equal where the response has none, shape (n_frequencies,).
+
+    Args:
+        response: with its own weights or without.
+
+    Returns:
+        Relative to one another.
+    """
     return np.ones(response.frequency_hz.size) if response.weight is None else response.weight
 
 

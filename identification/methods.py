@@ -86,6 +86,9 @@ def era_recording(
         n_rows: as for `era`.
         n_columns: as for `era`.
 
+    Returns:
+        Models of all orders, and the singular values of the Hankel matrix.
+
     Raises:
         RecordingError: the records are neither pulses nor free decays.
         OrderError: an order exceeds the rank of the data.
@@ -119,6 +122,9 @@ def okid_era_recording(
         n_lags: as for `okid_era`.
         form: as for `okid_era`.
 
+    Returns:
+        Models of all orders, and the singular values of the Hankel matrix.
+
     Raises:
         IdentificationError: as for `okid_era`.
 
@@ -150,6 +156,12 @@ def shows_rank(realization: Realization) -> bool:
 
     The best converters resolve 24 bits, 6e-8 of their range; nothing measured falls by a factor of 1000 to
     below 1e-8.
+
+    Args:
+        realization: with its singular values.
+
+    Returns:
+        True for data without noise.
     """
     s, n = realization.singular_values, realization.order
     return bool(n < s.size and s[n] <= 1e-8 * s[0] and s[n - 1] >= 1e3 * s[n])
@@ -221,6 +233,12 @@ METHODS = {
 
 def find_method(name: str) -> Method:
     """The method of that name.
+
+    Args:
+        name: as in `METHODS`.
+
+    Returns:
+        The entry of `METHODS`.
 
     Raises:
         IdentificationError: there is none.

@@ -40,6 +40,9 @@ def modal_outputs(poles: Complex, shapes: Complex) -> Array:
     Args:
         poles: shape (n_poles,).
         shapes: φ, shape (n_outputs, n_poles); that of a real pole is real.
+
+    Returns:
+        Shape (n_outputs, n_states).
     """
     columns = []
     for pole, shape in zip(poles, shapes.T, strict=True):
@@ -49,6 +52,11 @@ def modal_outputs(poles: Complex, shapes: Complex) -> Array:
 
 def modal_gains(poles: Complex, participation: Complex, points: Complex) -> Complex:
     """(p I - A)⁻¹ B for the states of `modal_states`, at every point p.
+
+    Args:
+        poles: sampled, one of each conjugate pair, shape (n_poles,).
+        participation: rows of B as of `modal_states`, shape (n_poles, n_inputs).
+        points: shape (n_points,).
 
     Returns:
         Shape (n_points, n_states, n_inputs).
@@ -66,5 +74,12 @@ def modal_gains(poles: Complex, participation: Complex, points: Complex) -> Comp
 
 
 def widths(poles: Complex) -> NDArray[np.intp]:
-    """States of each pole: two for a complex one, which stands for its conjugate too, and one for a real one."""
+    """States of each pole: two for a complex one, which stands for its conjugate too, and one for a real one.
+
+    Args:
+        poles: one of each conjugate pair, shape (n_poles,).
+
+    Returns:
+        Shape (n_poles,).
+    """
     return np.where(poles.imag != 0, 2, 1)

@@ -97,6 +97,9 @@ def modal_parameters(
         inputs: input channels wanted; the participation of those that the model lacks starts at zero.
         dt: sample time [s] of modes; needed for them alone.
 
+    Returns:
+        The family around that model.
+
     Raises:
         IdentificationError: modes without a sample time.
     """

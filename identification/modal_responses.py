@@ -88,7 +88,14 @@ class Pairs(NamedTuple):
 
 
 def spectrum(system: StateSpace) -> Spectrum | None:
-    """Poles and eigenvectors; None where A has too few eigenvectors to work with, as at a critical damping."""
+    """Poles and eigenvectors; None where A has too few eigenvectors to work with, as at a critical damping.
+
+    Args:
+        system: sampled or continuous.
+
+    Returns:
+        Poles and eigenvectors, or None.
+    """
     # In balanced coordinates the units of the states have no say in the condition number.
     balanced, (scale, _) = scipy.linalg.matrix_balance(system.A, permute=False, separate=True)
     poles, phi = scipy.linalg.eig(balanced)
@@ -106,7 +113,17 @@ def spectrum(system: StateSpace) -> Spectrum | None:
 
 
 def simulate(system: StateSpace, modes: Spectrum, run: Run, initial: Array | None) -> Array:
-    """Outputs under the inputs of the run and from the initial state, shape (n_outputs, n_samples)."""
+    """Outputs under the inputs of the run and from the initial state, shape (n_outputs, n_samples).
+
+    Args:
+        system: the model.
+        modes: its spectrum.
+        run: the record; its outputs do not matter.
+        initial: state at the first sample; rest when None.
+
+    Returns:
+        Shape (n_outputs, n_samples).
+    """
     weights = _prediction(system, modes, run, initial)
     blocks = [weights @ X for _, X in _signals(system, modes, run, initial is not None, None)]
     return np.concatenate(blocks, axis=1)
@@ -126,6 +143,9 @@ def normal_equations(
 
     Returns:
         Shapes (n,) and (n, n), where n counts the parameters and the states of `initial`.
+
+    Source: Kay (1993), Fundamentals of Statistical Signal Processing I, eq. (3.31), for a covariance that does
+        not depend on the parameters.
     """
     predict = _prediction(tangent.system, modes, run, initial)
     pairs = close_pairs(modes, tangent.system.dt, run)
@@ -158,6 +178,14 @@ def close_pairs(modes: Spectrum, system_dt: float, run: Run) -> Pairs:
     """Pairs of poles that drift apart by less than a hundredth while their responses last.
 
     Others may be divided by their difference: squared, as in the information, that costs four digits.
+
+    Args:
+        modes: poles of the model.
+        system_dt: its sample time [s]; 0 for a continuous one.
+        run: the record, for its length.
+
+    Returns:
+        The pairs.
     """
     poles = modes.poles
     size = np.maximum(np.abs(poles), np.finfo(float).tiny)
@@ -210,7 +238,16 @@ def _rows(x: Array) -> Array:
 
 
 def recursion(z: complex, forcing: Complex, start: Complex) -> tuple[Complex, Complex]:
-    """x⁺ = z x + forcing along the last axis from `start`, and the x after the last one."""
+    """x⁺ = z x + forcing along the last axis from `start`, and the x after the last one.
+
+    Args:
+        z: sampled pole.
+        forcing: shape (…, n_samples).
+        start: x at the first sample, shape (…).
+
+    Returns:
+        x at all samples, shape (…, n_samples), and behind the last, shape (…).
+    """
     from scipy.signal import lfilter  # slow to load, and only simulations need it
 
     x, after = lfilter([0, 1], [1, -z], forcing, axis=-1, zi=start[..., None])

@@ -62,6 +62,9 @@ def modal_scaling(system: StateSpace) -> ModalScaling:
     Args:
         system: sampled or continuous; its channels say which degree of freedom they read or drive.
 
+    Returns:
+        Modal a and modal mass of each mode.
+
     Raises:
         NotSecondOrderError: no degree of freedom has both a sensor and an actuator, or a mode does not move
             any that has.

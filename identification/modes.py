@@ -113,6 +113,9 @@ def mac(a: Complex, b: Complex) -> Array:
         a: shapes, (n_outputs, n_modes_a).
         b: shapes at the same outputs, (n_outputs, n_modes_b).
 
+    Returns:
+        Squared cosines between the shapes.
+
     Raises:
         IdentificationError: the sets have different outputs.
 
@@ -125,6 +128,12 @@ def mac(a: Complex, b: Complex) -> Array:
 
 def auto_mac(shapes: Complex) -> Array:
     """MAC of a set with itself, shape (n_modes, n_modes): off the diagonal, how badly the outputs tell modes apart.
+
+    Args:
+        shapes: shape (n_outputs, n_modes).
+
+    Returns:
+        Ones on the diagonal.
 
     Source: Allemang (2003), Sound Vib. 37(8), 14-21.
     """
@@ -139,6 +148,9 @@ def comac(a: Complex, b: Complex) -> Array:
     Args:
         a: shapes, (n_outputs, n_modes).
         b: shapes of the same modes in the same order, likewise.
+
+    Returns:
+        One number per output.
 
     Raises:
         IdentificationError: the sets differ in outputs or modes.
@@ -168,6 +180,9 @@ def cross_orthogonality(a: Complex, b: Complex, mass: Array) -> Array:
         b: likewise, (n_dofs, n_modes_b).
         mass: M, symmetric and positive definite, shape (n_dofs, n_dofs).
 
+    Returns:
+        One number per pair.
+
     Raises:
         IdentificationError: the shapes differ in length from M.
 
@@ -195,6 +210,12 @@ def _same_outputs(a: Complex, b: Complex) -> tuple[Complex, Complex]:
 def modal_phase_collinearity(shapes: Complex) -> Array:
     """How far each shape is from a monophase one, shape (n_modes,): 1 when all parts move in phase or in opposition.
 
+    Args:
+        shapes: shape (n_outputs, n_modes).
+
+    Returns:
+        Numbers from 0 to 1.
+
     Source: Juang and Pappa (1985), J. Guidance 8(5), the coherence of a shape's real and imaginary parts; written with
     the eigenvalues l1 >= l2 of their 2 x 2 covariance as ((l1 - l2) / (l1 + l2))².
     """
@@ -209,6 +230,12 @@ def mean_phase(shapes: Complex) -> Array:
 
     The line through the origin from which the components have the least sum of squared distances.
 
+    Args:
+        shapes: shape (n_outputs, n_modes).
+
+    Returns:
+        One angle per mode.
+
     Source: Reynders, Houbrechts and De Roeck (2012), Mech. Syst. Signal Process. 29, eq. (9); there by a singular
     value decomposition, here as half the phase of Σφ².
     """
@@ -219,6 +246,12 @@ def mean_phase_deviation(shapes: Complex) -> Array:
     """Mean angle between the components and the mean phase [rad], weighted by their size, shape (n_modes,).
 
     Zero for a monophase shape; π/4 for components all around the circle.
+
+    Args:
+        shapes: shape (n_outputs, n_modes).
+
+    Returns:
+        One angle per mode.
 
     Source: Reynders, Houbrechts and De Roeck (2012), Mech. Syst. Signal Process. 29, eq. (10).
     """
@@ -231,6 +264,12 @@ def mean_phase_deviation(shapes: Complex) -> Array:
 
 def real_shapes(shapes: Complex) -> Array:
     """The real shape nearest to each complex one up to a turn: real part along its mean phase, same array shape.
+
+    Args:
+        shapes: shape (n_outputs, n_modes).
+
+    Returns:
+        Real numbers of the same shape.
 
     Source: Ahmadian, Gladwell and Ismail (1995), J. Sound Vib. 182(4): of all turned copies it has the largest
     real part.

@@ -139,6 +139,9 @@ def output_error(
         theta: any parameters in it, to see how many states it has.
         initial_state: `rest`, `free`, or `auto` for free in free decays only.
 
+    Returns:
+        Records and family, ready to be compared.
+
     Raises:
         IdentificationError: there is no model at θ.
         RecordingError: samples of an input are missing, a record has neither inputs nor a free initial state, the model is
@@ -185,7 +188,16 @@ def output_error(
 
 
 def simulated(system: StateSpace, runs: Sequence[Run], initial: Sequence[Array | None]) -> list[Array]:
-    """Outputs of each run, shape (n_outputs, n_samples)."""
+    """Outputs of each run, shape (n_outputs, n_samples).
+
+    Args:
+        system: the model.
+        runs: the records.
+        initial: state at the first sample of each; rest when None.
+
+    Returns:
+        One array per record.
+    """
     modes = modal_responses.spectrum(system)
     if modes is None:
         return [cascade.simulate(system, run, x0) for run, x0 in zip(runs, initial, strict=True)]

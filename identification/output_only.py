@@ -59,6 +59,16 @@ def plan_hankel(
 ) -> Plan:
     """The plan with what is None chosen from the data.
 
+    Args:
+        recording: whose outputs are realized.
+        order: as asked; None to choose.
+        orders: further ones; likewise.
+        n_rows: block rows; likewise.
+        n_references: references in a block column.
+
+    Returns:
+        Orders and horizon, with the reasons.
+
     Raises:
         OrderError: an order below 1, or above what the Hankel matrix can carry.
         IdentificationError: fewer than two block rows.
@@ -109,8 +119,13 @@ def realized(
             n_references).
         scale: what the outputs were divided by, shape (n_outputs, 1).
 
+    Returns:
+        Models without inputs.
+
     Raises:
         OrderError: an order exceeds the rank of H.
+
+    Source: as for `shift_invariance`.
     """
     U, singular_values = leading_subspace(H, plan.orders[-1] + 2)
     wanted = orders_within_rank(plan, singular_values, H.shape)
@@ -125,6 +140,9 @@ def past_and_future(R: Array, plan: Plan) -> Array:
         R: covariances from the first lag wanted on, shape (n_lags, n_outputs, n_references).
         plan: the horizon.
 
+    Returns:
+        The Hankel matrix, a block column per lag of the past.
+
     Source: Cambraia and Kurka (2010), VI CONEM, eq. (29), with the block columns in reverse order.
     """
     return np.hstack([R[lag : lag + plan.n_rows].reshape(-1, R.shape[2]) for lag in plan.past])
@@ -132,6 +150,14 @@ def past_and_future(R: Array, plan: Plan) -> Array:
 
 def orders_within_rank(plan: Plan, singular_values: Array, shape: tuple[int, ...]) -> list[int]:
     """The orders of the plan that the data carry; the caller's own ones must be among them.
+
+    Args:
+        plan: orders wanted.
+        singular_values: of the Hankel matrix, largest first.
+        shape: of the Hankel matrix.
+
+    Returns:
+        Rising.
 
     Raises:
         OrderError: an order exceeds the numerical rank.
@@ -154,7 +180,19 @@ def gathered(
     singular_values: Array,
     models: Sequence[tuple[Array, Array]],
 ) -> Realization:
-    """The realization made of A and C of every order, with the order chosen where the caller left it open."""
+    """The realization made of A and C of every order, with the order chosen where the caller left it open.
+
+    Args:
+        method: name of the method.
+        recording: where the outputs come from.
+        order: the one to choose; where the singular values drop most steeply when None.
+        plan: orders and horizon.
+        singular_values: of the Hankel matrix, largest first.
+        models: A and C of every order.
+
+    Returns:
+        Models without inputs.
+    """
     systems = tuple(_outputs_only(A, C, recording) for A, C in models)
     notes = plan.notes
     if order is None:
@@ -212,6 +250,9 @@ def horizon_warning(modes: Modes, realization: Realization) -> tuple[str, ...]:
     Args:
         modes: those found.
         realization: from a Hankel matrix, with its size in the settings; calculated data need no longer horizon.
+
+    Returns:
+        At most one warning.
 
     Source: Reynders and De Roeck (2008), Mech. Syst. Signal Process. 22(3), the least number of block rows.
     """

@@ -97,6 +97,13 @@ class Custom:
 def start_values(model: Any, names: Sequence[str]) -> Array:
     """Start values as an array of the right length.
 
+    Args:
+        model: numbers, one for each name.
+        names: of the parameters.
+
+    Returns:
+        Shape (n_parameters,).
+
     Raises:
         IdentificationError: `model` is not one finite number for each name.
     """
@@ -115,6 +122,11 @@ def central_differences(system: Callable[[Array], StateSpace], theta: Array) -> 
     Args:
         system: θ to the model.
         theta: parameters; a zero is moved by steps as for one.
+
+    Returns:
+        Model and derivatives.
+
+    Source: Nocedal and Wright (2006), Numerical Optimization, 2nd ed., section 8.1.
     """
     steps = np.cbrt(np.finfo(float).eps) * np.where(theta == 0, 1.0, np.abs(theta))
     pairs = []
@@ -136,6 +148,11 @@ def central_differences(system: Callable[[Array], StateSpace], theta: Array) -> 
 
 def require_channels(system: StateSpace, inputs: Sequence[Channel], outputs: Sequence[Channel]) -> None:
     """Check that a model has the channels of the recording, in the same order.
+
+    Args:
+        system: the model.
+        inputs: input channels of the recording.
+        outputs: output channels of the recording.
 
     Raises:
         IdentificationError: it has others.

@@ -101,6 +101,12 @@ def response_rank(response: FrequencyResponse) -> int | None:
 
     The singular values of the reduced equations fall off a cliff, and as many zeros of the denominator as
     stand above it, and no more, lie inside the unit circle.
+
+    Args:
+        response: to forces, or positive spectra.
+
+    Returns:
+        Number of states or None.
     """
     thin = response.take(slice(None, None, -(-response.frequency_hz.size // MAX_LINES)))  # any lines show it
     n_f, _, n_inputs = thin.values.shape
@@ -207,7 +213,15 @@ def _highest_degree(n_f: int, n_inputs: int, degree: int | None, asked: list[int
 
 
 def default_degree(n_lines: int, n_inputs: int) -> int:
-    """Highest degree that lines and bounds allow."""
+    """Highest degree that lines and bounds allow.
+
+    Args:
+        n_lines: lines fitted.
+        n_inputs: inputs, or references.
+
+    Returns:
+        At least 1.
+    """
     return max(min(MAX_DEGREE, MAX_ORDER // n_inputs, n_lines // 2), 1)
 
 

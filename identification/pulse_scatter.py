@@ -46,8 +46,17 @@ def pulse_tangent(recording: Recording, realization: Realization, order: int) ->
 def residual_std(markov: MarkovParameters, system: StateSpace) -> Array:
     """Standard deviation of what the model leaves of each response, shape (n_outputs, n_inputs).
 
+    Args:
+        markov: the responses measured.
+        system: the model.
+
+    Returns:
+        In the units of the responses.
+
     Raises:
         TooShortError: fewer samples than parameters.
+
+    Source: Seber and Lee (2003), Linear Regression Analysis, 2nd ed., theorem 3.3, the unbiased estimate of a variance.
     """
     residual = markov.values[1:] - system.markov(markov.n_lags).values[1:]
     n_lags, n_outputs, n_inputs = residual.shape

@@ -91,7 +91,14 @@ class Channel:
 
 
 def frozen(values: Any) -> Array:
-    """A read-only float64 copy of `values`."""
+    """A read-only float64 copy of `values`.
+
+    Args:
+        values: numbers in an array of any shape.
+
+    Returns:
+        An array that cannot be written to.
+    """
     array = np.array(values, dtype=np.float64)
     array.setflags(write=False)
     return array

@@ -15,7 +15,14 @@ BLOCK = 4096
 
 
 def rms(recording: Recording) -> Array:
-    """Root mean square of each input, then each output, over all records."""
+    """Root mean square of each input, then each output, over all records.
+
+    Args:
+        recording: inputs and outputs.
+
+    Returns:
+        Shape (n_inputs + n_outputs,).
+    """
     total = np.zeros(len(recording.inputs) + len(recording.outputs))
     for record in recording.records:
         for u, y in record.blocks(1 << 16):
@@ -24,7 +31,15 @@ def rms(recording: Recording) -> Array:
 
 
 def triangular(R: Array, rows: Array) -> Array:
-    """Triangular factor of the rows stacked below R: exact, and no larger than the columns."""
+    """Triangular factor of the rows stacked below R: exact, and no larger than the columns.
+
+    Args:
+        R: upper triangular, shape (n, n_columns) with n at most n_columns.
+        rows: shape (n_rows, n_columns).
+
+    Returns:
+        Upper triangular, with the same inner products of columns as both together.
+    """
     stacked = np.vstack([R, rows])
     return np.asarray(
         scipy.linalg.qr(stacked, mode="r", overwrite_a=True, check_finite=False)[0][: stacked.shape[1]]

@@ -56,6 +56,9 @@ def spread_of_parts(values: Array) -> Array:
     Args:
         values: shape (n_parts, n_values); NaN where an estimate could not be had, which makes it infinite.
 
+    Returns:
+        In the unit of the values.
+
     Source: Künsch (1989), Ann. Stat. 17(3), eq. (2.3).
     """
     n_parts = len(values)
@@ -66,7 +69,16 @@ def spread_of_parts(values: Array) -> Array:
 
 
 def without_part(recording: Recording, part: int, n_parts: int) -> Recording:
-    """The recording without one of `n_parts` parts of equal length; a record cut in two becomes two records."""
+    """The recording without one of `n_parts` parts of equal length; a record cut in two becomes two records.
+
+    Args:
+        recording: any.
+        part: number of the part, from 0.
+        n_parts: how many there are.
+
+    Returns:
+        The other samples, in order.
+    """
     borders = np.linspace(0, recording.n_samples, n_parts + 1).astype(int)
     first, last = int(borders[part]), int(borders[part + 1])
     records: list[Record] = []

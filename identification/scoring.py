@@ -116,7 +116,18 @@ class Curvature:
 
 
 def noise_model(problem: OutputError, *, per_record: bool) -> Noise:
-    """The noise of a problem, with a floor relative to the size of each signal."""
+    """The noise of a problem, with a floor relative to the size of each signal.
+
+    Args:
+        problem: records and family of models.
+        per_record: whether the noise of an output may differ from record to record.
+
+    Returns:
+        How variances follow from squared errors.
+
+    Raises:
+        IdentificationError: all outputs are zero.
+    """
     power = problem.power
     if not np.any(power):
         raise IdentificationError("all outputs are zero, so there is nothing to fit; check the recording")
@@ -131,6 +142,9 @@ def maximize(problem: OutputError, noise: Noise, start: Array, *, max_iterations
         noise: noise model.
         start: unknowns to begin with, shape (n_unknowns,).
         max_iterations: steps after which to give up.
+
+    Returns:
+        Where the search ended.
 
     Raises:
         IdentificationError: the model of the start cannot be simulated.
@@ -215,6 +229,9 @@ def solve_linear(problem: OutputError, start: Array, which: NDArray[np.bool_]) -
         problem: records and family of models.
         start: unknowns, shape (n_unknowns,).
         which: mask of the linear ones.
+
+    Returns:
+        Shape (n_unknowns,).
     """
     gradient, information = problem.normal_equations(start, 1 / problem.power)
     best = start.copy()

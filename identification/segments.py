@@ -64,6 +64,9 @@ def choose_segments(recording: Recording, *, n_segment: int | None = None, decay
         n_segment: samples of a piece; asks for pieces under a Hann window, whatever the kinds.
         decay: rate of an exponential window for transient records [1/s].
 
+    Returns:
+        Where the pieces are, how they are weighted, and why.
+
     Raises:
         TooShortError: no record is as long as `n_segment`.
         IdentificationError: an exponential window for records that are not transient.
@@ -96,6 +99,14 @@ def choose_segments(recording: Recording, *, n_segment: int | None = None, decay
 
 def hann_segments(recording: Recording, n_segment: int | None, *, n_averages: int) -> Segments:
     """Half-overlapping pieces under a periodic Hann window, about `n_averages` when their length is None.
+
+    Args:
+        recording: at least one record.
+        n_segment: samples of a piece; None to choose.
+        n_averages: how many pieces to aim at.
+
+    Returns:
+        Where the pieces are, and how they are weighted.
 
     Raises:
         TooShortError: no record is as long as `n_segment`, or it is below 8.
@@ -145,6 +156,12 @@ def find_period(record: Record) -> int | None:
 
     The mean squared change of the inputs over a lag, relative to their power, is near zero at the period and
     at its multiples; the smallest of these lags counts. Noise on the inputs may have a tenth of their power.
+
+    Args:
+        record: with inputs.
+
+    Returns:
+        Number of samples, or None.
     """
     n = record.n_samples
     if not record.inputs.shape[0] or n < 4:

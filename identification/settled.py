@@ -24,6 +24,10 @@ REACH = 2.0
 """How many tolerances a pole may be from the mean of its cluster, whose members differ by up to one from each other."""
 
 
+LASTING = 1 / 3
+"""Length of a cluster over that of the longest one, from which on it counts as a mode that lasts."""
+
+
 class Settled(NamedTuple):
     """The modes of a stabilization, each read off one model.
 
@@ -31,7 +35,7 @@ class Settled(NamedTuple):
         order: the lowest with a pole for every lasting mode.
         modes: sorted by frequency; those that the model of that order lacks come from the first that has them.
         places: order and continuous-time pole [rad/s] of each mode.
-        brief: whether each mode shows at less than half as many orders as the one that lasts longest.
+        brief: whether each mode shows at less than a third as many orders as the one that lasts longest.
         notes: the order and why, and which brief poles were taken for part of another mode, one sentence each.
     """
 
@@ -45,7 +49,7 @@ class Settled(NamedTuple):
 def settle(stabilization: Stabilization) -> Settled:
     """The modes at the lowest order with a pole for every mode that lasts over the orders.
 
-    A mode lasts when its cluster is at least half as long as the longest. A cluster that appears late and briefly does not
+    A mode lasts when its cluster is at least a third as long as the longest. A cluster that appears late and briefly does not
     raise the order for all others, and is left out where it resembles a mode that lasts, as when noise splits one in two.
 
     Args:
@@ -59,7 +63,7 @@ def settle(stabilization: Stabilization) -> Settled:
     """
     length = np.bincount(stabilization.cluster[stabilization.cluster >= 0])
     first = [int(np.flatnonzero(stabilization.cluster == k)[0]) for k in range(length.size)]
-    lasting = 2 * length >= np.max(length)
+    lasting = length >= LASTING * np.max(length)
     orders = np.unique(stabilization.orders)
     position = np.stack([_poles_of_modes(stabilization, order) for order in orders])  # (n_orders, n_modes)
     k = int(np.argmax(np.sum(position[:, lasting] >= 0, axis=1)))

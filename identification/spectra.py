@@ -226,6 +226,13 @@ def unit_sizes(power: Array, channels: Sequence[Channel]) -> Array:
 
     Divided by it, channels of different units weigh alike, whatever the units are. Those of one unit share a
     size, because among them a small signal does weigh less against the noise.
+
+    Args:
+        power: of each channel, mean or sum, shape (n_channels,).
+        channels: with their units.
+
+    Returns:
+        In the units of the channels.
     """
     units = np.array([channel.unit for channel in channels])
     size = np.ones(units.size)

@@ -171,6 +171,9 @@ def repeat(
         orders: those wanted, rising.
         given: further settings that the method was given.
         strongest: for `plscf`, whether to keep the strongest poles of the highest degree; as before when None.
+
+    Returns:
+        Function of a recording with the same channels and rate.
     """
     method, own = find_method(realization.method), realization.settings
     fixed: dict[str, Any] = {name: value for name, value in own.items() if name in method.settings}

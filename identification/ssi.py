@@ -62,6 +62,14 @@ def balance(R: Array, recording: Recording, rows: NDArray[np.intp]) -> Array:
 
     Without it the choice of a unit would decide which outputs the truncated subspace follows. Outputs of
     one unit share a scale, because among them the size of a signal does tell its weight against the noise.
+
+    Args:
+        R: covariances, shape (n_lags, n_outputs, n_references).
+        recording: for the units.
+        rows: those of the references, shape (n_references,).
+
+    Returns:
+        What the outputs were divided by.
     """
     units = np.array([channel.unit for channel in recording.outputs])
     scale, reference_scale = np.ones(units.size), np.ones(rows.size)

@@ -190,6 +190,9 @@ def in_three_parts(
         dofs: names of the degrees of freedom.
         parts: patterns of mass, damping and stiffness, each (n_patterns, n_dofs, n_dofs).
         known_mass: what the mass has besides, shape (n_dofs, n_dofs); nothing when None.
+
+    Returns:
+        The structure as a function of its parameters.
     """
     n = len(dofs)
     zero = np.zeros((n, n))
@@ -230,6 +233,11 @@ def channel_matrices(
     dofs: Sequence[str], inputs: Sequence[Channel], outputs: Sequence[Channel]
 ) -> tuple[Array, Array, Array, Array]:
     """Where the channels sit: f = B u and y = C_p q + C_v q̇ + C_a q̈.
+
+    Args:
+        dofs: degrees of freedom.
+        inputs: input channels.
+        outputs: output channels.
 
     Returns:
         B, shape (n_dofs, n_inputs), and C_p, C_v, C_a, each (n_outputs, n_dofs).

@@ -17,6 +17,11 @@ def autocorrelation(residual: Array, n_lags: int) -> Array:
     Args:
         residual: shape (n_rows, n_samples).
         n_lags: largest lag.
+
+    Returns:
+        Numbers from -1 to 1; zero for a row of zeros.
+
+    Source: Ljung and Box (1978), Biometrika 65(2), the residual autocorrelations of section 1.
     """
     n_samples = residual.shape[1]
     size = scipy.fft.next_fast_len(n_samples + n_lags, real=True)
@@ -35,6 +40,9 @@ def whiteness(residuals: Sequence[Array], *, n_lags: int = 20) -> Array:
     Args:
         residuals: one array per record, shape (n_outputs, n_samples); NaN where a sample is missing.
         n_lags: number of lags looked at, lowered where a record is shorter than five times as many samples.
+
+    Returns:
+        Numbers from 0 to 1.
 
     Source: Ljung and Box (1978), Biometrika 65(2), statistic Q̃, summed over the records; where samples are missing
         each lag counts by the pairs that are left, as in Dunsmuir and Robinson (1981), J. Am. Stat. Assoc. 76, 560-568.

@@ -17,6 +17,11 @@ def hold(poles: Complex, system_dt: float, dt: float) -> tuple[Complex, Complex]
         poles: λ [rad/s], or z.
         system_dt: zero for a continuous model.
         dt: sample time [s].
+
+    Returns:
+        Two arrays, shape (n_poles,) each.
+
+    Source: Åström and Wittenmark (1997), Computer-Controlled Systems, 3rd ed., section 2.3.
     """
     if system_dt:
         return poles, np.ones(poles.shape, dtype=np.complex128)
@@ -34,6 +39,12 @@ def divided_hold(a: Complex, b: Complex, system_dt: float, dt: float) -> tuple[C
 
     Nothing cancels: z_a - z_b = z_b (e^(λ_a - λ_b)dt - 1), and h follows from λ h = z - 1 for fast poles, from
     ∫ t e^λ_b t φ((λ_a - λ_b) t) dt over one sample for slow ones.
+
+    Returns:
+        Two arrays, shape (n_pairs,) each.
+
+    Source: Van Loan (1978), IEEE Trans. Autom. Control 23(3), 395-404: the derivative of an exponential as an
+        integral.
     """
     if system_dt:
         return np.ones(a.shape, dtype=np.complex128), np.zeros(a.shape, dtype=np.complex128)
