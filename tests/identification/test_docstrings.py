@@ -10,69 +10,27 @@ import identification
 
 FOLDER = Path(identification.__file__).parent
 
-NO_EQUATION = {
-    # Choices, checks, words and the plumbing between methods.
-    *(
-        "choose_method",
-        "choose_orders",
-        "choose_segments",
-        "explanation",
-        "family",
-        "find_method",
-        "first_settled",
-    ),
-    *(
-        "brief_warnings",
-        "find_period",
-        "find_peaks",
-        "gathered",
-        "hankel_size",
-        "orders_within_rank",
-        "plan_hankel",
-    ),
-    *(
-        "output_error",
-        "planned",
-        "predict",
-        "repeat",
-        "require_channels",
-        "settle_orders",
-        "shows_rank",
-        "simulated",
-    ),
-    *(
-        "start_values",
-        "response_rank",
-        "resonance_band",
-        "default_degree",
-        "numerical_rank",
-        "leading_subspace",
-    ),
-    # Arrays put in another form.
-    *(
-        "channel_matrices",
-        "free_matrices",
-        "frozen",
-        "in_three_parts",
-        "modal_parameters",
-        "passive",
-        "reference_rows",
-    ),
-    *("spring_network", "transforms", "widths", "without_part", "cluster_means", "join"),
-    # One line of algebra that the first line of the docstring is.
-    *("balance", "cluster_scatter", "close_pairs", "excited", "line_weight", "line_weights", "least_squares"),
-    *(
-        "modal_gains",
-        "modal_outputs",
-        "modal_states",
-        "noise_model",
-        "recursion",
-        "residual_std",
-        "rms",
-        "simulate",
-    ),
-    *("solve_linear", "spectrum", "triangular", "unit_sizes"),
-}
+CHOICES = """
+brief_warnings choose_method choose_orders choose_segments default_degree explanation family find_method
+find_peaks find_period first_settled gathered hankel_size leading_subspace numerical_rank orders_within_rank
+output_error plan_hankel planned predict repeat require_channels resonance_band response_rank settle_orders
+shows_rank simulated start_values
+"""
+"""Choices, checks, words, and the plumbing between methods."""
+
+REARRANGED = """
+channel_matrices cluster_means free_matrices frozen in_three_parts join modal_parameters passive
+reference_rows spring_network transforms widths without_part
+"""
+"""Arrays put in another form."""
+
+ALGEBRA = """
+balance close_pairs cluster_scatter excited least_squares line_weight line_weights modal_gains modal_outputs
+modal_states noise_model recursion rms simulate solve_linear spectrum triangular unit_sizes
+"""
+"""A line of algebra that the first line of the docstring is."""
+
+NO_EQUATION = set(f"{CHOICES} {REARRANGED} {ALGEBRA}".split())
 
 
 def public(kind):
