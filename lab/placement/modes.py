@@ -3,104 +3,23 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
 
 import numpy as np
-import scipy.linalg
 
-from identification.recording import DERIVATIVE, Array
+from identification.recording import Array
 from lab.errors import LabError
-from lab.placement.candidates import Candidates, force_columns, motion_rows, require_number
+from lab.placement.candidates import Candidates, motion_rows, require_number
+from lab.placement.choice import LIMIT, Choice, choose
 from lab.placement.criteria import CRITERIA, Criterion
 from lab.placement.independence import effective_independence, kinetic_energy
 from lab.placement.loading import added_mass, frequency_shifts
 from lab.placement.outcome import Placement, Ranked
-from lab.placement.search import ceiling, count, enumerated, exchange, greedy
+from lab.placement.search import count, greedy
+from lab.placement.shapes import choose_actuators, normal_modes, sensor_shapes
 from lab.rig import Rig
 
-LIMIT = 200_000
-"""Layouts up to this number are all compared, which proves the best."""
-RIGID = 1e-9
-"""A mode whose stiffness is below this share of the largest moves the structure as a whole."""
-TOLD = 10
-"""Best layouts that are told by name."""
 SAME = 1e-9
 """Figures that differ by less, relatively, are the same."""
-
-
-@dataclass(frozen=True, eq=False)
-class Choice:
-    """Blocks chosen, and what is known about the choice.
-
-    Attributes:
-        chosen: positions of blocks, in rising order.
-        score: of the criterion.
-        ceiling: score that no choice exceeds; None where no bound is known.
-        proven: whether every choice was compared.
-        layouts, scores: of every choice, best first, where all were compared; no rows otherwise.
-    """
-
-    chosen: tuple[int, ...]
-    score: float
-    ceiling: float | None
-    proven: bool
-    layouts: np.ndarray
-    scores: Array
-
-
-def choose(
-    grams: Array, n: int, criterion: Criterion, *, fixed: Sequence[int] = (), limit: int = LIMIT
-) -> Choice:
-    """The n blocks of highest score: proven by enumeration up to a limit, else found by exchange with a bound.
-
-    Args:
-        grams: what each block brings, shape (n_blocks, m, m).
-        n: blocks to choose, the fixed ones included.
-        criterion: score.
-        fixed: blocks in every choice.
-        limit: number of choices up to which all are compared.
-    """
-    if count(len(grams), n, n_fixed=len(fixed)) <= limit:
-        layouts, scores = enumerated(grams, n, criterion, fixed=fixed)
-        order = np.argsort(-scores, kind="stable")
-        layouts, scores = layouts[order], scores[order]
-        best = tuple(int(block) for block in layouts[0])
-        return Choice(best, float(scores[0]), float(scores[0]), True, layouts, scores)
-    best = exchange(grams, greedy(grams, n, criterion, fixed=fixed), criterion, fixed=fixed)
-    score = float(criterion.score(grams[list(best)].sum(axis=0)[None])[0])
-    top = ceiling(grams, best, criterion, fixed=fixed)
-    return Choice(best, score, top, False, np.zeros((0, n), dtype=int), np.zeros(0))
-
-
-def normal_modes(rig: Rig) -> tuple[Array, Array]:
-    """Angular frequencies [rad/s], rising, and shapes of unit modal mass (n_dofs, n_modes); rigid ones left out.
-
-    Undamped: where sensors see modes does not hang on how these decay.
-    """
-    structure = rig.second_order()
-    values, shapes = scipy.linalg.eigh(structure.stiffness, structure.mass)
-    flexible = values > RIGID * values[-1]
-    return np.sqrt(values[flexible]), shapes[:, flexible]
-
-
-def sensor_shapes(rig: Rig, omega: Array, shapes: Array, noise: Mapping[str, float]) -> Array:
-    """Reading of each output per unit of each modal coordinate, in its noise where that is given; (n_outputs, n_modes).
-
-    Raises:
-        LabError: outputs of several quantities, and no noise to compare them by.
-    """
-    rows = motion_rows(rig) @ shapes
-    felt = [channel for channel in rig.outputs if channel.quantity in DERIVATIVE]
-    if noise:
-        std = np.array([noise.get(channel.unit, np.nan) for channel in rig.outputs])
-        lacking = {channel.unit for channel in felt if channel.unit not in noise}
-        if lacking:
-            raise LabError(
-                f"no noise is given for sensors in {', '.join(sorted(lacking))}; expected one number for each unit"
-            )
-        power = np.array([DERIVATIVE.get(channel.quantity, 0) for channel in rig.outputs])
-        return np.asarray(np.nan_to_num(rows * omega ** power[:, None] / std[:, None]))
-    return np.asarray(rows)
 
 
 def place_modes(
@@ -222,22 +141,6 @@ def _require_one_quantity(rig: Rig, sensors: Candidates, noise: Mapping[str, flo
             f"the candidates read in {', '.join(units)}, which nothing makes comparable; give the noise of each, or one "
             "quantity"
         )
-
-
-def choose_actuators(
-    rig: Rig, actuators: Candidates, n: int, *, n_modes: int | None = None, limit: int = LIMIT
-) -> tuple[int, ...]:
-    """The actuators with which the force on the faintest of the lowest modes is largest; all modes when None."""
-    if not n:
-        return ()
-    require_number("actuator", n, actuators)
-    shapes = normal_modes(rig)[1][:, :n_modes]
-    participation = actuators.padded((shapes.T @ force_columns(rig)).T)
-    # Each mode in units of what all actuators together do to it.
-    size = np.sqrt(np.sum(participation**2, axis=(0, 1)))
-    participation = participation / np.where(size > 0, size, 1.0)
-    grams = np.einsum("bcm,bcn->bmn", participation, participation)
-    return choose(grams, n, CRITERIA["visibility"], fixed=actuators.fixed, limit=limit).chosen
 
 
 def _rules(

@@ -83,8 +83,11 @@ def ranking_table(placement: Placement, *, layouts: bool = True) -> Table:
 def drive_table(placement: Placement) -> Table:
     """Other signals and levels for the layout chosen."""
     return Table(
-        ("Signal", "Largest force [N]", "Figure"),
-        tuple((d.excitation, f"{d.peak:.4g}", figure_text(placement, d.figure)) for d in placement.drives),
+        ("Signal", "Duration [s]", "Largest force [N]", "Figure"),
+        tuple(
+            (d.excitation, f"{d.duration:.4g}", f"{d.peak:.4g}", figure_text(placement, d.figure))
+            for d in placement.drives
+        ),
     )
 
 
