@@ -221,7 +221,7 @@ def test_modes_and_response_at_five_per_cent_noise(kind):
         inputs = [np.tile(np.fft.irfft(np.exp(1j * p) * (np.arange(1501) > 0), 3000), (1, 4)) for p in phase]
         recording = systems.recorded(truth, inputs, kind=kind)
     else:
-        recording = systems.recorded(truth, [rng.standard_normal((n, 60_000))])
+        recording = systems.recorded(truth, [rng.standard_normal((n, 24_000))])
     recording = noisy_recording(recording, 0.05, 7)
     modes = stabilize(plscf_recording(recording)).modes
     expected = truth.modes()
