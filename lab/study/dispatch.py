@@ -21,8 +21,6 @@ AHEAD = 2
 """Batches per worker handed out at a time: one in work, one ready."""
 MAX_DEATHS = 2
 """A run whose worker dies so often, each time alone at work, is to blame for it."""
-
-
 MAX_GIVEN_UP = 10
 """So many runs in a row that kill their workers are the fault of the workers."""
 
@@ -150,7 +148,8 @@ class _Dispatch:
         if len(self.given_up) >= MAX_GIVEN_UP:
             raise StudyError(
                 f"{MAX_GIVEN_UP} runs in a row killed their workers ({failure(error)}); expected workers with enough "
-                "memory that can import lab; what was finished is kept, so mend them and give the same command again"
+                "memory that can import lab, and in a script 'if __name__ == \"__main__\":' before the call; mend "
+                "that and do the same again, what was finished is kept"
             )
 
 
