@@ -21,6 +21,7 @@ from identification.observer import Observer, observe
 from identification.parameterizations import Tangent
 from identification.recording import Array, Recording
 from identification.regression import BLOCK, FROM_REST
+from identification.residual_scatter import redrawn
 from identification.systems import Realization, StateSpace
 
 DRAWS = 60
@@ -41,19 +42,6 @@ class Signals(NamedTuple):
     clean: Array
     noise: Array
     first: int
-
-    def draw(self, rng: np.random.Generator) -> Array:
-        """Noise with the spectra and cross-spectra of that of the record, by phases drawn anew.
-
-        Source: Prichard and Theiler (1994), Phys. Rev. Lett. 73(7), eq. (3).
-        """
-        E = scipy.fft.rfft(self.noise)
-        turn = np.exp(2j * np.pi * rng.random(E.shape[1]))
-        turn[0] = 1
-        n = self.noise.shape[1]
-        if n % 2 == 0:
-            turn[-1] = np.sign(turn[-1].real)
-        return np.asarray(scipy.fft.irfft(E * turn, n))
 
 
 def observer_tangent(
@@ -88,7 +76,7 @@ def observer_tangent(
     scaled = replace(system, B=system.B * size_u, C=system.C / size_y, D=system.D / size_y * size_u)
     records = _signals(scaled, recording, found)
     rng = np.random.default_rng(0)
-    draws = [[record.draw(rng) for record in records] for _ in range(DRAWS)]
+    draws = [[redrawn(record.noise, rng) for record in records] for _ in range(DRAWS)]
     changes = _markov_changes(records, draws, found.length, int(settings["n_lags"])) / np.sqrt(DRAWS)
     moved = hankel_tangent(
         scaled, changes, n_rows=int(settings["n_rows"]), n_columns=int(settings["n_columns"])

@@ -67,7 +67,7 @@ def residual_std(
     for _ in range(DRAWS):
         records = tuple(
             replace(
-                record, outputs=np.asarray(record.outputs[:, :], dtype=float) - e + scale * _redrawn(e, rng)
+                record, outputs=np.asarray(record.outputs[:, :], dtype=float) - e + scale * redrawn(e, rng)
             )
             for record, e in zip(recording.records, residuals, strict=True)
         )
@@ -80,8 +80,19 @@ def residual_std(
     return np.where(np.mean(have, axis=0) >= 1 - MAY_FAIL, np.sqrt(variance), np.inf)
 
 
-def _redrawn(e: Array, rng: np.random.Generator) -> Array:
-    """The signals with lines and phases redrawn, the same for all of them, shape (n_outputs, n_samples)."""
+def redrawn(e: Array, rng: np.random.Generator) -> Array:
+    """Noise that might have been in place of the noise e: lines of nearby frequencies with phases drawn anew.
+
+    Args:
+        e: noise of all outputs, shape (n_outputs, n_samples).
+        rng: source of lines and phases, the same ones for all outputs, which keeps their cross-spectra.
+
+    Returns:
+        Shape (n_outputs, n_samples).
+
+    Source: Paparoditis and Politis (1999), J. Time Ser. Anal. 20(2), 193-222, the local bootstrap; Prichard and Theiler
+        (1994), Phys. Rev. Lett. 73(7), eq. (3), the phases.
+    """
     E = scipy.fft.rfft(e)
     n = E.shape[1]
     reach = int(np.ceil(NEARBY * n))

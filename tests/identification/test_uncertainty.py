@@ -116,16 +116,6 @@ def test_scores_by_correlation_are_those_of_the_regression():
     assert_allclose(_score(record, y, theta, p), expected, atol=1e-10)
 
 
-@pytest.mark.parametrize("n", [64, 65])
-def test_drawn_noise_has_the_spectra_of_the_residual(n):
-    noise = np.random.default_rng(4).standard_normal((2, n))
-    drawn = Signals(np.zeros((1, n)), noise, noise, 0).draw(np.random.default_rng(5))
-    assert not np.allclose(drawn, noise, atol=0.1)
-    a, b = np.fft.rfft(noise), np.fft.rfft(drawn)
-    assert_allclose(b[0] * b[1].conj(), a[0] * a[1].conj(), atol=1e-11)
-    assert_allclose(np.abs(b), np.abs(a), atol=1e-11)
-
-
 def test_the_jackknife_of_a_mean_is_the_standard_error_of_the_part_means():
     y = np.random.default_rng(6).standard_normal((1, 1000))
     recording = Recording((output_record(y[:, :350]), output_record(y[:, 350:])), (), CHANNELS, 1.0)
@@ -205,10 +195,10 @@ def test_too_short_a_record_says_so_and_has_none():
 @pytest.mark.slow
 @pytest.mark.parametrize("name", CASES)
 def test_error_bars_are_as_long_as_the_scatter_of_repeated_tests(name):
-    n = 25
+    n = 16
     found = calibrate(CASES[name], n, seed=1)
     assert found.n_tests >= 0.9 * n
-    # A ratio is known to 1/√(2 n) = 14 %, and the draws of the noise know it to 9 %: three of both together
+    # A ratio is known to 1/√(2 n) = 18 %, and the draws of the noise know it to 9 %: three of both together
     # beyond the range of 0.8 to 1.25 that is asked for.
     slack = 3 * np.hypot(1 / np.sqrt(2 * n), 0.09)
     assert np.all(np.median(found.ratio) < 1.25)
