@@ -23,12 +23,12 @@ ROOT = Path(__file__).resolve().parent.parent
 sys.path.insert(0, str(ROOT))
 
 from lab.scenario import load_scenario  # noqa: E402
-from lab.study import journal  # noqa: E402
-from lab.study.dispatch import dispatch  # noqa: E402
-from lab.study.evaluate import Task, perform  # noqa: E402
-from lab.study.plan import Run, Study  # noqa: E402
-from lab.study.table import columns_of, write_table  # noqa: E402
-from lab.study.workers import Crew, local_crew  # noqa: E402
+from lab.studies import journal  # noqa: E402
+from lab.studies.dispatch import dispatch  # noqa: E402
+from lab.studies.evaluate import Task, perform  # noqa: E402
+from lab.studies.plan import Run, Study  # noqa: E402
+from lab.studies.table import columns_of, write_table  # noqa: E402
+from lab.studies.workers import Crew, local_crew  # noqa: E402
 
 SCORE = {
     "frequency_error": [0.1234567890123456] * 3,

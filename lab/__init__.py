@@ -34,7 +34,7 @@ if TYPE_CHECKING:
     from lab.run import identify_file, run
     from lab.scenario import Scenario, load_scenario
     from lab.simulate import simulate
-    from lab.study.conduct import study
+    from lab.studies.conduct import study
 
 _WHERE = {
     "Diagnosis": ("lab.diagnosis.outcome", "Diagnosis"),
@@ -56,7 +56,7 @@ _WHERE = {
     "run": ("lab.run", "run"),
     "save_recording": ("lab.files.recording", "save"),
     "simulate": ("lab.simulate", "simulate"),
-    "study": ("lab.study.conduct", "study"),
+    "study": ("lab.studies.conduct", "study"),
 }
 
 __all__ = [

@@ -9,7 +9,7 @@ import pytest
 
 from lab import catalogue
 from lab.cli import main
-from lab.study.plan import load_study
+from lab.studies.plan import load_study
 
 ROOT = Path(__file__).parent.parent
 TEXT = (ROOT / "docs/study.md").read_text("utf-8")

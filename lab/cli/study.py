@@ -32,9 +32,9 @@ def command(
     Stopped, however rudely, the same command goes on where it stopped; a study file that asks for more values or
     repeats adds runs to those that are there.
     """
-    from lab.study.conduct import study
-    from lab.study.outcome import study_document
-    from lab.study.wording import study_summary
+    from lab.studies.conduct import study
+    from lab.studies.outcome import study_document
+    from lab.studies.wording import study_summary
 
     folder = out or Path("out") / study_file.stem
     with Progress("running", quiet) as progress:

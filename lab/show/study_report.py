@@ -7,8 +7,8 @@ from pathlib import Path
 from lab.show.figures.study import draw_study
 from lab.show.page import checksums, inline, surroundings, template
 from lab.show.verdict import Verdict
-from lab.study.outcome import Outcome
-from lab.study.wording import number, told, varied, words
+from lab.studies.outcome import Outcome
+from lab.studies.wording import number, told, varied, words
 
 BESIDE = ("study.h5",)
 """Files of the same folder that the report vouches for."""

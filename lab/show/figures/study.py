@@ -12,14 +12,14 @@ from matplotlib.figure import Figure
 
 from lab.show.drawing import SERIES
 from lab.show.figures.canvas import DASHES, Drawing, drawing, few_ticks, logarithmic, plain
-from lab.study.axes import Axis
-from lab.study.outcome import Outcome
-from lab.study.statistics import NOMINAL, Statistic
-from lab.study.wording import told, words
+from lab.studies.axes import Axis
+from lab.studies.outcome import Outcome
+from lab.studies.statistics import NOMINAL, Statistic
+from lab.studies.wording import told, words
 
 MAX_LINES = 6
 FIGURES = {
-    "share": "Share of runs that succeed",
+    "share": "Share of runs that succeed, and of true modes found",
     "coverage": "Coverage: share of error bars of two standard deviations that hold the truth; dotted, the nominal 95.45 %",
     "rms": "RMS errors, relative to the truth",
     "mean": "Means over the runs",
@@ -138,7 +138,7 @@ def _numeric(axis: Axis) -> bool:
 
 
 def _wide(x: np.ndarray) -> bool:
-    return bool(x.min() > 0 and x.max() >= 20 * x.min())
+    return bool(x.min() > 0 and x.max() >= 10 * x.min())
 
 
 def _name(others: Sequence[Axis], line: int) -> str:

@@ -5,7 +5,7 @@ import json
 import pytest
 
 from lab.cli import main
-from tests.lab.study.small import STUDY, conducted, written
+from tests.lab.studies.small import STUDY, conducted, written
 
 
 def said(capsys, *words):

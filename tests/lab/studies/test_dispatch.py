@@ -9,11 +9,11 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from lab.errors import StudyError
-from lab.study.dispatch import AHEAD, BATCH_SECONDS, dispatch
-from lab.study.evaluate import Task
-from lab.study.plan import Run
-from lab.study.workers import Crew
-from tests.lab.study.small import Following
+from lab.studies.dispatch import AHEAD, BATCH_SECONDS, dispatch
+from lab.studies.evaluate import Task
+from lab.studies.plan import Run
+from lab.studies.workers import Crew
+from tests.lab.studies.small import Following
 
 TASK = Task({}, "", {})
 

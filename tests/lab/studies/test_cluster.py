@@ -10,8 +10,8 @@ import pytest
 
 import lab
 from lab.errors import StudyError
-from lab.study.workers import mpi_crew
-from tests.lab.study.small import STUDY, conducted, rows, written
+from lab.studies.workers import mpi_crew
+from tests.lab.studies.small import STUDY, conducted, rows, written
 
 
 @pytest.mark.slow

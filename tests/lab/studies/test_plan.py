@@ -4,9 +4,9 @@ import pytest
 
 from lab import catalogue
 from lab.errors import FileError, StudyError, UnknownNameError
-from lab.study.axes import Axis
-from lab.study.plan import Study, load_study
-from tests.lab.study.small import STUDY, loaded, written
+from lab.studies.axes import Axis
+from lab.studies.plan import Study, load_study
+from tests.lab.studies.small import STUDY, loaded, written
 
 
 def test_every_setting_has_every_repeat_once(tmp_path):

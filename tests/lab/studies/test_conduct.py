@@ -9,10 +9,10 @@ import pytest
 
 import lab
 from lab.errors import FileError, StudyError
-from lab.study import journal
-from lab.study.outcome import study_document
-from lab.study.wording import study_summary
-from tests.lab.study.small import STUDY, Here, conducted, rows, written
+from lab.studies import journal
+from lab.studies.outcome import study_document
+from lab.studies.wording import study_summary
+from tests.lab.studies.small import STUDY, Here, conducted, rows, written
 
 
 @pytest.fixture(scope="module")

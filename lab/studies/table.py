@@ -14,8 +14,8 @@ import h5py
 import numpy as np
 
 from identification.recording import Array
-from lab.study import journal
-from lab.study.plan import Study
+from lab.studies import journal
+from lab.studies.plan import Study
 
 FORMAT = "modal-study"
 VERSION = 1

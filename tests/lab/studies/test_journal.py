@@ -7,8 +7,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from lab.errors import FileError, StudyError
-from lab.study import journal
-from tests.lab.study.small import STUDY, loaded
+from lab.studies import journal
+from tests.lab.studies.small import STUDY, loaded
 
 LINES = [json.dumps({"run": k, "seed": k, "seconds": 0.5, "score": {"verdict": "Ω" * k}}) for k in range(4)]
 

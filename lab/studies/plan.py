@@ -16,8 +16,8 @@ from pydantic import Field, PositiveInt, ValidationError
 
 from lab.errors import FileError, StudyError
 from lab.scenario import Scenario, Table, explain, load_scenario, make_scenario
-from lab.study.axes import Axis, axes_of, changed
-from lab.study.collect import check_collected
+from lab.studies.axes import Axis, axes_of, changed
+from lab.studies.collect import check_collected
 
 MAX_TRIED = 1000
 """Values of an axis that are tried before the study starts."""

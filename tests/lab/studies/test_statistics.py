@@ -7,11 +7,11 @@ import h5py
 import numpy as np
 import pytest
 
-from lab.study import journal, table
-from lab.study.axes import Axis
-from lab.study.plan import Study
-from lab.study.statistics import share_interval, statistics
-from lab.study.table import columns_of, write_table
+from lab.studies import journal, table
+from lab.studies.axes import Axis
+from lab.studies.plan import Study
+from lab.studies.statistics import share_interval, statistics
+from lab.studies.table import columns_of, write_table
 
 N_POINTS, REPEATS = 3, 7
 

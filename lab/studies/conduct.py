@@ -12,14 +12,14 @@ import h5py
 
 from lab.errors import FileError, StudyError
 from lab.files.folder import output_folder
-from lab.study import journal
-from lab.study.dispatch import dispatch
-from lab.study.evaluate import Task
-from lab.study.outcome import Outcome
-from lab.study.plan import Study, load_study
-from lab.study.statistics import statistics
-from lab.study.table import columns_of, write_table
-from lab.study.workers import Crew, dask_crew, local_crew, mpi_crew
+from lab.studies import journal
+from lab.studies.dispatch import dispatch
+from lab.studies.evaluate import Task
+from lab.studies.outcome import Outcome
+from lab.studies.plan import Study, load_study
+from lab.studies.statistics import statistics
+from lab.studies.table import columns_of, write_table
+from lab.studies.workers import Crew, dask_crew, local_crew, mpi_crew
 
 Progress = Callable[..., None]
 """Called with the number of runs finished since the last call, and `total`, how many were left to do at the start."""

@@ -9,8 +9,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from lab.errors import StudyError
-from lab.study.axes import Axis, Range, axes_of, changed
-from tests.lab.study.small import SCENARIO
+from lab.studies.axes import Axis, Range, axes_of, changed
+from tests.lab.studies.small import SCENARIO
 
 TABLE = {
     **tomllib.loads(SCENARIO),

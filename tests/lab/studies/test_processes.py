@@ -10,7 +10,7 @@ import time
 import pytest
 
 import lab
-from tests.lab.study.small import STUDY, conducted, rows, written
+from tests.lab.studies.small import STUDY, conducted, rows, written
 
 pytestmark = pytest.mark.slow
 MANY = STUDY.replace("repeats = 3", "repeats = 12")

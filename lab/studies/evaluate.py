@@ -18,10 +18,10 @@ from lab.files.results import result_document
 from lab.run import examine, held_against, model_of, rig_of, touched, truth_of
 from lab.scenario import Scenario, make_scenario
 from lab.simulate import simulate
-from lab.study.axes import changed
-from lab.study.collect import picked
-from lab.study.plan import Run
-from lab.study.score import Score, scored, scored_diagnosis
+from lab.studies.axes import changed
+from lab.studies.collect import picked
+from lab.studies.plan import Run
+from lab.studies.score import Score, scored, scored_diagnosis
 
 
 @dataclass(frozen=True)

@@ -11,9 +11,9 @@ from itertools import islice
 from typing import NamedTuple
 
 from lab.errors import StudyError
-from lab.study.evaluate import Task, failure, perform
-from lab.study.plan import Run
-from lab.study.workers import Crew
+from lab.studies.evaluate import Task, failure, perform
+from lab.studies.plan import Run
+from lab.studies.workers import Crew
 
 BATCH_SECONDS = 0.3
 """Aim for the time of a batch: long beside the cost of handing it out, short beside what anybody waits for."""

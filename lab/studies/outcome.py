@@ -8,8 +8,8 @@ from dataclasses import dataclass
 from typing import Any
 
 from lab.files.document import plain
-from lab.study.plan import Study
-from lab.study.statistics import Statistic
+from lab.studies.plan import Study
+from lab.studies.statistics import Statistic
 
 FORMAT = "modal-study"
 VERSION = 1

@@ -10,7 +10,7 @@ import h5py
 import numpy as np
 
 from identification.recording import Array
-from lab.study.table import blocks
+from lab.studies.table import blocks
 
 NOMINAL = 0.9545
 """Share of normal errors below two standard deviations."""
@@ -24,7 +24,7 @@ class Statistic:
 
     Attributes:
         name: share, coverage, RMS or mean of what.
-        kind: "share" (of runs), "coverage" (mean share of error bars that hold), "rms" or "mean".
+        kind: "share" (of runs, or of true modes), "coverage" (mean share of error bars that hold), "rms" or "mean".
         value, low, high: NaN where no run has the number; the ends also where a single run has one.
         n: number of runs that have it.
     """
@@ -69,7 +69,7 @@ def _wanted(file: h5py.File) -> Iterator[tuple[str, str, Quantities]]:
         if name in there:
             yield name, "share", one(name)
     if "modes_found" in there:
-        yield "modes_found", "mean", one("modes_found")
+        yield "modes_found", "share", one("modes_found")
     for name in ("frequency", "damping"):
         if f"{name}_std" in there:
             yield f"{name}_covered", "coverage", partial(_covered, name=name)

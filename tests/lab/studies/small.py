@@ -4,9 +4,9 @@ import json
 import threading
 from concurrent.futures import Executor, Future
 
-from lab.study import journal
-from lab.study.conduct import study
-from lab.study.plan import load_study
+from lab.studies import journal
+from lab.studies.conduct import study
+from lab.studies.plan import load_study
 
 SCENARIO = """
 title = "Three masses, one force, one accelerometer"

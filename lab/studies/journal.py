@@ -19,8 +19,8 @@ import numpy as np
 
 from lab.errors import FileError, StudyError
 from lab.scenario import make_scenario
-from lab.study.axes import changed
-from lab.study.plan import Study
+from lab.studies.axes import changed
+from lab.studies.plan import Study
 
 NAME = "study.jsonl"
 FORMAT = "modal-study-journal"

@@ -7,14 +7,14 @@ import math
 import textwrap
 from typing import Any
 
-from lab.study.outcome import Outcome
-from lab.study.statistics import Statistic
+from lab.studies.outcome import Outcome
+from lab.studies.statistics import Statistic
 
 WORDS = {
     "named_rightly": "named rightly",
     "verdict_right": "verdict right",
     "criteria_met": "criteria met",
-    "modes_found": "share of modes found",
+    "modes_found": "modes found",
     "frequency_covered": "coverage, frequency",
     "damping_covered": "coverage, damping",
     "parameter_covered": "coverage, parameters",
@@ -36,11 +36,11 @@ SHORT = {
     "criteria_met": "criteria",
     "modes_found": "found",
     "frequency_covered": "freq.",
-    "damping_covered": "damp.",
-    "parameter_covered": "param.",
-    "mass_covered": "M",
-    "damping_matrix_covered": "C",
-    "stiffness_covered": "K",
+    "damping_covered": "±damp.",
+    "parameter_covered": "±param.",
+    "mass_covered": "±M",
+    "damping_matrix_covered": "±C",
+    "stiffness_covered": "±K",
     "frequency_error": "freq.",
     "damping_error": "damp.",
     "mass_error": "M",
@@ -92,7 +92,9 @@ def study_summary(outcome: Outcome) -> str:
         f"{study.title}\n{study.n_runs} runs{failed}: {study.n_points} points, {study.repeats} "
         f"repeat{'s' if study.repeats > 1 else ''}",
         _table(
-            "share of runs, and of error bars (±2 standard deviations) that hold the truth", SHARES, outcome
+            "share of runs or modes that succeed, and of error bars (±2 standard deviations) that hold the truth",
+            SHARES,
+            outcome,
         ),
         _table("RMS errors relative to the truth, and means", ("rms", "mean"), outcome),
         f"and {study.n_points - SHOWN} more points, in report.html and study.h5"
