@@ -50,7 +50,6 @@ def place_file(
     with output_folder(out, force=force) as folder:
         planned_test = None if scenario is None else load_scenario(scenario)
         rig = _rig(model, planned_test)
-        rig = rig.connected(outputs=rig.responding)
         plan = _plan(rig, planned_test, dict(test or {}))
         if planned_test is not None:
             settings = {**settings, "planned": _layout(planned_test)}

@@ -55,7 +55,7 @@ def sensor_candidates(
     fixed: Sequence[str] = (),
     forbid: Sequence[str] = (),
 ) -> Candidates:
-    """The output channels that feel motion, one by one or a three-axis sensor at a time.
+    """The output channels that motion can move, one by one or a three-axis sensor at a time.
 
     Args:
         rig: with every channel connected that may be used.
@@ -70,9 +70,11 @@ def sensor_candidates(
     """
     if quantity is not None and quantity not in DERIVATIVE:
         raise LabError(f"quantity is {quantity!r}; expected one of {', '.join(DERIVATIVE)}")
+    # An axis across all motion would only record rounding errors.
+    felt = set(rig.responding)
     groups: dict[str, list[int]] = {}
     for i, channel in enumerate(rig.outputs):
-        if channel.quantity in ((quantity,) if quantity else DERIVATIVE):
+        if channel.name in felt and channel.quantity in ((quantity,) if quantity else DERIVATIVE):
             sensor = channel.name.rpartition(".")[0] if triaxial else ""
             groups.setdefault(sensor or channel.name, []).append(i)
     names = {name: [name, *(rig.outputs[i].name for i in own)] for name, own in groups.items()}
@@ -133,11 +135,17 @@ def require_number(what: str, n: int, candidates: Candidates) -> None:
 
 def motion_rows(rig: Rig) -> Array:
     """Reading of each output per unit of its own derivative of motion, shape (n_outputs, n_dofs); none of other signals."""
-    n, system, M = len(rig.dofs), rig.force_response(), rig.second_order().mass
-    rows = np.zeros((len(rig.outputs), n))
+    n = len(rig.dofs)
+    position = {dof: k for k, dof in enumerate(rig.dofs)}
+    rows, several = np.zeros((len(rig.outputs), n)), []
     for i, channel in enumerate(rig.outputs):
-        derivative = DERIVATIVE.get(channel.quantity)
-        if derivative is not None:
+        if channel.dof in position and channel.quantity in DERIVATIVE:
+            rows[i, position[channel.dof]] = channel.factor
+        elif channel.quantity in DERIVATIVE and channel.name in rig.responding:
+            several.append((i, DERIVATIVE[channel.quantity]))
+    if several:
+        system, M = rig.force_response(), rig.second_order().mass
+        for i, derivative in several:
             # A reading of acceleration feels a force at once: D = C_a M⁻¹.
             rows[i] = (system.C[i, :n], system.C[i, n : 2 * n], system.D[i] @ M)[derivative]
     return rows

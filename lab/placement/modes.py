@@ -62,7 +62,7 @@ def place_modes(
     _require_references(n_sensors, setups, references)
     total = references + setups * (n_sensors - references)
     require_number("sensor", total, sensors)
-    _require_one_quantity(rig, sensors, noise)
+    _require_comparable(rig, sensors, noise or {})
     omega, shapes = normal_modes(rig)
     n_channels = sum(sorted(len(own) for own in sensors.channels)[::-1][:total])
     m = min(n_channels, len(omega)) if n_modes is None else n_modes
@@ -71,8 +71,8 @@ def place_modes(
             f"{m} modes asked for, with {n_channels} channels and {len(omega)} modes of the structure; expected 1 to "
             f"{min(n_channels, len(omega))}"
         )
-    omega, shapes = omega[:m], shapes[:, :m]
-    blocks = sensors.padded(sensor_shapes(rig, omega, shapes, noise or {}))
+    omega, shapes, rows = omega[:m], shapes[:, :m], motion_rows(rig)
+    blocks = sensors.padded(sensor_shapes(rig, rows @ shapes, omega, noise or {}))
     grams = np.einsum("bcm,bcn->bmn", blocks, blocks)
     rule = CRITERIA[criterion]
     fixed = sensors.fixed
@@ -87,7 +87,7 @@ def place_modes(
             "allow more places"
         )
     inputs = choose_actuators(rig, actuators, n_actuators, n_modes=m, limit=limit)
-    momenta = sensors.padded(motion_rows(rig) @ rig.second_order().mass @ shapes)
+    momenta = sensors.padded(rows @ (rig.second_order().mass @ shapes))
     rules = _rules(blocks, grams, momenta, total, sensors, found.chosen, rule)
     named = actuators.named(inputs)
     ranking = [_ranked(name, grams, chosen, rule, found, sensors, named) for name, chosen in rules.items()]
@@ -134,9 +134,14 @@ def _require_references(n_sensors: int, setups: int, references: int) -> None:
         )
 
 
-def _require_one_quantity(rig: Rig, sensors: Candidates, noise: Mapping[str, float] | None) -> None:
+def _require_comparable(rig: Rig, sensors: Candidates, noise: Mapping[str, float]) -> None:
     units = sorted({rig.outputs[i].unit for own in sensors.channels for i in own})
-    if len(units) > 1 and not noise:
+    lacking = [unit for unit in units if unit not in noise]
+    if noise and lacking:
+        raise LabError(
+            f"no noise is given for sensors in {', '.join(lacking)}; expected one number for each unit"
+        )
+    if len(lacking) > 1:
         raise LabError(
             f"the candidates read in {', '.join(units)}, which nothing makes comparable; give the noise of each, or one "
             "quantity"

@@ -63,10 +63,6 @@ def place(
     require_known(rig, fixed, forbid)
     sensors = sensor_candidates(rig, quantity=quantity, triaxial=triaxial, fixed=fixed, forbid=forbid)
     actuators = actuator_candidates(rig, fixed=fixed, forbid=forbid)
-    # What cannot be chosen costs no work.
-    outputs = [rig.outputs[i].name for i in sensors.channels_of(range(len(sensors)))]
-    rig = rig.connected(outputs=outputs) if outputs else rig
-    sensors = sensor_candidates(rig, quantity=quantity, triaxial=triaxial, fixed=fixed, forbid=forbid)
     other = None if planned is None else (_found(sensors, planned[0]), _found(actuators, planned[1]))
     if target == "modes":
         from lab.placement.modes import place_modes
@@ -74,6 +70,11 @@ def place(
         return place_modes(
             rig, sensors, actuators, n_sensors, n_actuators, noise=noise, planned=other, **settings
         )
+    # What cannot be chosen costs no work; in the same order, so that positions among the candidates stay.
+    outputs = [rig.outputs[i].name for i in sorted(sensors.channels_of(range(len(sensors))))]
+    if len(outputs) < len(rig.outputs):
+        rig = rig.connected(outputs=outputs)
+        sensors = sensor_candidates(rig, quantity=quantity, triaxial=triaxial, fixed=fixed, forbid=forbid)
     if not n_actuators:
         raise LabError(f"no number of actuators is given; expected one for the target {target}")
     require_number("actuator", n_actuators, actuators)

@@ -8,8 +8,7 @@ import numpy as np
 import scipy.linalg
 
 from identification.recording import DERIVATIVE, Array
-from lab.errors import LabError
-from lab.placement.candidates import Candidates, force_columns, motion_rows, require_number
+from lab.placement.candidates import Candidates, force_columns, require_number
 from lab.placement.choice import LIMIT, choose
 from lab.placement.criteria import CRITERIA
 from lab.rig import Rig
@@ -29,24 +28,20 @@ def normal_modes(rig: Rig) -> tuple[Array, Array]:
     return np.sqrt(values[flexible]), shapes[:, flexible]
 
 
-def sensor_shapes(rig: Rig, omega: Array, shapes: Array, noise: Mapping[str, float]) -> Array:
-    """Reading of each output per unit of each modal coordinate, in its noise where that is given; (n_outputs, n_modes).
+def sensor_shapes(rig: Rig, readings: Array, omega: Array, noise: Mapping[str, float]) -> Array:
+    """Reading of each output per unit of each modal coordinate, over its noise; (n_outputs, n_modes).
 
-    Raises:
-        LabError: outputs of several quantities, and no noise to compare them by.
+    Args:
+        rig: structure.
+        readings: of each output per unit of its own derivative of each modal coordinate, (n_outputs, n_modes).
+        omega: natural angular frequencies [rad/s].
+        noise: standard deviation by unit; where empty, outputs are of one quantity and equally noisy.
     """
-    rows = motion_rows(rig) @ shapes
-    felt = [channel for channel in rig.outputs if channel.quantity in DERIVATIVE]
-    if noise:
-        std = np.array([noise.get(channel.unit, np.nan) for channel in rig.outputs])
-        lacking = {channel.unit for channel in felt if channel.unit not in noise}
-        if lacking:
-            raise LabError(
-                f"no noise is given for sensors in {', '.join(sorted(lacking))}; expected one number for each unit"
-            )
-        power = np.array([DERIVATIVE.get(channel.quantity, 0) for channel in rig.outputs])
-        return np.asarray(np.nan_to_num(rows * omega ** power[:, None] / std[:, None]))
-    return np.asarray(rows)
+    if not noise:
+        return readings
+    std = np.array([noise.get(channel.unit, np.inf) for channel in rig.outputs])
+    power = np.array([DERIVATIVE.get(channel.quantity, 0) for channel in rig.outputs])
+    return np.asarray(readings * omega ** power[:, None] / std[:, None])
 
 
 def choose_actuators(
