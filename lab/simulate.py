@@ -60,6 +60,7 @@ def simulate(
     n_runs: int = 1,
     seed: int = 0,
     accuracy: float | None = None,
+    substeps: int | None = None,
     progress: Progress | None = None,
 ) -> Recording:
     """The recording that a test bench would deliver.
@@ -73,6 +74,7 @@ def simulate(
         seed: of everything random; the same seed gives the same recording to the last bit.
         accuracy: largest error of the simulated response relative to the largest value of its channel; when None, a
             thousandth of the smallest noise in the chain, or 1e-9 when it adds none, as far as 256 substeps go.
+        substeps: per sample, in place of an accuracy; the error is not measured then.
         progress: called with the number of samples done since the last call.
 
     Returns:
@@ -82,12 +84,19 @@ def simulate(
         LabError: the accuracy cannot be reached, or the excitation does not fit the rig.
         DivergedError: the motion is no longer finite.
     """
-    bench = _Bench.prepare(rig, excitation, sample_rate, duration, n_runs, seed, accuracy)
+    if substeps is None:
+        bench = _Bench.prepare(rig, excitation, sample_rate, duration, n_runs, seed, accuracy)
+    else:
+        bench = _Bench.loaded(rig, excitation, sample_rate, duration, n_runs, seed)._with(
+            stepping.Plan(substeps)
+        )
     records = []
     for number, (load_, blocks) in enumerate(bench.responses(progress)):
         parts = list(blocks)
         if rig.chain.whole_record:
-            parts = [tuple(np.concatenate(side, axis=1) for side in zip(*parts, strict=True))]
+            parts = [
+                (np.concatenate([a for a, _ in parts], axis=1), np.concatenate([b for _, b in parts], axis=1))
+            ]
         digitize = bench.digitizer(number, _rms(part[0] for part in parts), _rms(part[1] for part in parts))
         digitized = [digitize(a, b) for a, b in parts]
         measured = [part[0] for part in digitized] if load_.measured else [np.zeros((0, load_.n_samples))]

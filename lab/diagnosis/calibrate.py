@@ -134,7 +134,7 @@ def tone_peaks(residual: Array, dt: float) -> tuple[list[tuple[float, ...]], tup
         np.abs(np.fft.rfft(residual / residual.std(axis=1, keepdims=True) * np.hanning(n), size, axis=1)) ** 2
     )
     frequency = np.fft.rfftfreq(size, dt)
-    width = 201
+    width = min(201, frequency.size)
 
     def peak(power: Array) -> tuple[float, ...]:
         log = np.log(power + 1e-12)

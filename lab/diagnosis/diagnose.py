@@ -10,6 +10,7 @@ import numpy as np
 
 from identification.recording import Array, Recording
 from lab.diagnosis import words
+from lab.diagnosis.baseline import Baseline
 from lab.diagnosis.calibrate import Calibration, calibrate, parameters_of, survey_of
 from lab.diagnosis.check import check
 from lab.diagnosis.evidence import minus_two_log_evidence
@@ -42,6 +43,8 @@ from lab.rig import Rig
 from lab.twin import twin
 
 MOST_FINDINGS = 4
+LAW_SUBSTEPS = 12
+"""Substeps of further searches where a law was found, so that its numerics are not taken for another cause."""
 FINE_SUBSTEPS = 24
 """Substeps of the last fits, where the numerics must not be mistaken for physics."""
 
@@ -104,16 +107,18 @@ def diagnose(
     rig = nominal = _connected(rig, recording)
     model = twin(rig)
     parameters = parameters_of(model, widths)
+    known = None
     if baseline is not None:
         tell("calibrating on the baseline")
         known_state = _like(baseline, recording)
         base = Misfit.of(known_state, model, parameters, share=1.0)
         base = with_starts(base, free_decays(known_state))
-        known = calibrate(base, rig).fit
+        known = Baseline.of(calibrate(base, rig))
         # What the baseline taught becomes the model, and what it left open the prior.
-        rig = calibrated_rig(base, known.theta, rig)
-        model, parameters = twin(rig), _tightened(parameters, known)
+        rig = calibrated_rig(base, known.fit.theta, rig)
+        model, parameters = twin(rig), _tightened(parameters, known.fit)
     misfit = with_starts(Misfit.of(recording, model, parameters), free_decays(recording))
+    misfit = replace(misfit, colour=known.colour if known else 1.0)
     tell("calibrating")
     calibration = calibrate(misfit, rig)
     found = calibration.fit
@@ -129,12 +134,14 @@ def diagnose(
         if not candidates or candidates[0].gain < threshold:
             break
         state = _with(state, candidates[0], rig)
-        left = whiteness(_finely(state).fit.residual, inputs)
-        if left.passed and not any(c.gain > threshold for c in _still_wrong(state, effects)):
+        finely = _finely(state)
+        covered = known is not None and known.covers(finely.misfit, finely.fit)
+        left = whiteness(finely.fit.residual, inputs)
+        if (left.passed or covered) and not any(c.gain > threshold for c in _still_wrong(state, effects)):
             break
     state = _finely(_without_idle(state))
     left = whiteness(state.fit.residual, inputs)
-    return _outcome(state, recording, nominal, rig, first, left)
+    return _outcome(state, recording, nominal, rig, first, left, known)
 
 
 def evidence_threshold(looks: int) -> float:
@@ -194,6 +201,8 @@ def _with(state: State, candidate: Candidate, rig: Rig) -> State:
         tolerance=0.1,
     )
     misfit = replace(misfit, survey=survey_of(misfit, rig, refit.theta, refit.residual))
+    if misfit.plant(refit.theta, refit.causes).laws:
+        misfit = replace(misfit, substeps=LAW_SUBSTEPS)
     calibration = Calibration(misfit, refit, refit, 0.0)
     held_out = (*state.held_out, held_out_error(misfit, refit))
     return State(calibration, refit, (*state.accepted, candidate), state.origin, held_out)
@@ -296,7 +305,13 @@ def _own_change(state: State, candidate: Candidate, covariance: Array) -> tuple[
 
 
 def _outcome(
-    state: State, recording: Recording, nominal: Rig, rig: Rig, first: Sequence[Candidate], left: Whiteness
+    state: State,
+    recording: Recording,
+    nominal: Rig,
+    rig: Rig,
+    first: Sequence[Candidate],
+    left: Whiteness,
+    known: Baseline | None,
 ) -> Diagnosis:
     causes = effects_of(state)
     calibrated = calibrated_rig(state.misfit, state.origin.theta, rig)
@@ -308,7 +323,7 @@ def _outcome(
     floor = noise_floor(state.fit.residual, held_out(misfit))
     starts = [best_starts(misfit), starts_of(misfit, state.origin.theta), starts_of(misfit, state.fit.theta)]
     predictions = predictions_of(
-        recording, misfit, (nominal, calibrated, extended), starts, accuracy=max(0.1 * floor, 1e-6)
+        recording, misfit, (nominal, calibrated, extended), starts, accuracy=max(0.2 * floor, 1e-6)
     )
     shares = _shares(state, floor)
     findings = [
@@ -316,7 +331,9 @@ def _outcome(
         for (candidate, effect, quantities), share in zip(causes, shares, strict=True)
     ]
     verdict, warnings = (EXPLAINED if findings else CONSISTENT), []
-    if not left.passed:
+    if not left.passed and known is not None and known.covers(state.misfit, state.fit):
+        warnings.append(words.as_in_the_baseline(known.power, recording))
+    elif not left.passed:
         verdict = UNEXPLAINED
         warnings.append(words.left_over(left, recording))
     alternatives = _alternatives(first) if findings else ()

@@ -53,17 +53,18 @@ class Fit:
         return np.asarray(np.linalg.pinv(total, rcond=1e-14, hermitian=True), dtype=np.float64)
 
 
-def objective(residual: Array, theta: Array, precision: Array) -> float:
-    """-2 log posterior with the noise of every channel at its most likely level."""
+def objective(residual: Array, theta: Array, precision: Array, colour: float = 1.0) -> float:
+    """-2 log posterior with the noise of every channel at its most likely level; `colour` samples count as one."""
     power = np.mean(residual**2, axis=1)
     if not np.all(np.isfinite(power)):
         return np.inf
-    return float(residual.shape[1] * np.sum(np.log(np.maximum(power, 1e-300))) + theta @ precision @ theta)
+    n = residual.shape[1] / colour
+    return float(n * np.sum(np.log(np.maximum(power, 1e-300))) + theta @ precision @ theta)
 
 
-def weights(residual: Array) -> Array:
-    """One over the residual's RMS, per channel."""
-    return 1 / np.sqrt(np.maximum(np.mean(residual**2, axis=1), 1e-300))
+def weights(residual: Array, colour: float = 1.0) -> Array:
+    """One over the residual's RMS, per channel; `colour` samples count as one."""
+    return 1 / np.sqrt(np.maximum(colour * np.mean(residual**2, axis=1), 1e-300))
 
 
 def theta_slopes(
@@ -144,7 +145,7 @@ def fit(
     n = theta.size
     e = misfit.residual(theta, causes, observer=observer, n_train=n_train)
     P = misfit.parameters.precision
-    f, damping, age = objective(e, theta, P), 1e-3, refresh
+    f, damping, age = objective(e, theta, P, misfit.colour), 1e-3, refresh
     slopes = np.zeros((0, *e.shape))
     size = n + sum(cause.n for cause in causes)
     prior = np.zeros((size, size))
@@ -156,7 +157,7 @@ def fit(
         fresh = age == 0
         age += 1
         J = np.concatenate([slopes, cause_slopes(misfit, theta, causes, observer, e, n_train)])
-        w = weights(e)
+        w = weights(e, misfit.colour)
         Jw = (J * w[:, None]).reshape(size, -1)
         information = Jw @ Jw.T
         H = information + prior
@@ -172,7 +173,7 @@ def fit(
                 d[free] = -np.linalg.solve(scaled[np.ix_(free, free)], g[free])
                 trial, trial_causes = theta + d[:n], moved_by(causes, d[n:])
                 trial_e = misfit.residual(trial, trial_causes, observer=observer, n_train=n_train)
-                trial_f = objective(trial_e, trial, P)
+                trial_f = objective(trial_e, trial, P, misfit.colour)
                 if trial_f < f:
                     step = f - trial_f
                     break

@@ -85,7 +85,9 @@ def held_out_error(misfit: Misfit, found: Fit) -> float:
 
 def held_out(misfit: Misfit) -> Array:
     """Measured outputs that no fit has seen, of all records."""
-    return np.concatenate([y[:, n:] for (_, y), n in zip(misfit.records, misfit.n_train, strict=True)], axis=1)
+    return np.concatenate(
+        [y[:, n:] for (_, y), n in zip(misfit.records, misfit.n_train, strict=True)], axis=1
+    )
 
 
 def noise_floor(residual: Array, measured: Array) -> float:

@@ -156,6 +156,7 @@ class Misfit:
         dt: sample time [s].
         n_train: samples at the start of each record that fits may see.
         substeps: of the kernel.
+        colour: samples that count as one, since the model errs alike for a while.
     """
 
     twin: Twin
@@ -165,11 +166,14 @@ class Misfit:
     n_train: tuple[int, ...]
     survey: Survey | None = None
     substeps: int = 6
+    colour: float = 1.0
 
     @classmethod
     def of(cls, recording: Recording, twin: Twin, parameters: Parameters, *, share: float = 0.7) -> Misfit:
         """The misfit of a recording whose channels are those of the twin."""
-        records = tuple((_inputs(r, len(recording.inputs)), np.asarray(r.outputs[:, :])) for r in recording.records)
+        records = tuple(
+            (_inputs(r, len(recording.inputs)), np.asarray(r.outputs[:, :])) for r in recording.records
+        )
         n_train = tuple(
             min(int(share * y.shape[1]), _decayed(y) if share < 1 and r.kind == "free_decay" else y.shape[1])
             for r, (_, y) in zip(recording.records, records, strict=True)
@@ -193,7 +197,7 @@ class Misfit:
     def plant(self, theta: Array, causes: Sequence[Hypothesis] = ()) -> Plant:
         """The plant at parameters `theta` with causes in it."""
         plant = self.twin.changed(*self.parameters.factors(theta))
-        for cause in causes:
+        for cause in sorted(causes, key=lambda cause: cause.kind.grows):
             assert self.survey is not None
             plant = cause.effect.explain(plant, self.survey)
         return plant

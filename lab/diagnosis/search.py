@@ -9,10 +9,12 @@ import numpy as np
 
 from identification.recording import Array
 from lab.diagnosis.calibrate import Calibration
+from lab.diagnosis.changes import large_changes
 from lab.diagnosis.evidence import minus_two_log_evidence
 from lab.diagnosis.fit import POOL, Fit, cause_slopes, fit, moved_by, objective, theta_slopes, weights
 from lab.diagnosis.misfit import Hypothesis, Misfit
 from lab.diagnosis.observer import kalman_gain
+from lab.diagnosis.places import echoes, mends
 from lab.effects.effect import EVERYWHERE, Effect
 
 OWN_PARAMETERS = {"mass": "mass_change", "stiffness": "stiffness_change", "damping": "damping_change"}
@@ -69,6 +71,8 @@ def hypotheses(misfit: Misfit, effects: Mapping[str, type[Effect]]) -> list[Hypo
         for kind in effects.values()
         for location in kind.places(survey.rig)
         for guess in kind.guesses(survey, location)
+        # A place that the test does not move has no scale.
+        if all(0 < abs(scale) < np.inf for scale in guess.scale.values())
     ]
 
 
@@ -89,8 +93,9 @@ def screen(
         ]
     )
     P = misfit.parameters.precision
-    base = objective(e, theta, P)
-    w = weights(e)
+    colour = misfit.colour
+    base = objective(e, theta, P, colour)
+    w = weights(e, colour)
     J = (slopes * w[:, None]).reshape(slopes.shape[0], -1)
     n, size = theta.size, len(slopes)
     prior = np.zeros((size, size))
@@ -101,7 +106,7 @@ def screen(
         """Residual less what the model's parameters can explain of it, and its objective."""
         d = -H @ (J @ (r * w[:, None]).ravel() + prior[:, :n] @ theta)
         left = r + np.tensordot(d, slopes, axes=1)
-        return left, objective(left, theta + d[:n], P)
+        return left, objective(left, theta + d[:n], P, colour)
 
     def advanced(started: _Start, steps: int) -> _Start:
         """A start after a few Gauss-Newton steps on its own variables."""
@@ -115,7 +120,7 @@ def screen(
             own = np.array(
                 [x - np.tensordot(H @ (J @ (x * w[:, None]).ravel()), slopes, axes=1) for x in own]
             )
-            v = weights(left)
+            v = weights(left, colour)
             A = (own * v[:, None]).reshape(h.n, -1)
             G, g = A @ A.T, A @ (left * v[:, None]).ravel()
             if not np.trace(G) > 0:
@@ -163,9 +168,13 @@ def search(
         theta, observer = present.theta, present.observer
     else:
         theta, observer = calibration.guided.theta, calibration.observer
+    survey = misfit.survey
+    assert survey is not None
     proposed = hypotheses(misfit, effects)
-    taken = {(cause.kind, cause.location) for cause in causes}
-    proposed = [h for h in proposed if (h.kind, h.location) not in taken]
+    found = [(cause.kind, cause.location) for cause in causes]
+    proposed = [
+        h for h in proposed if not mends(h.kind, h.location, found, survey) and not echoes(h, causes, survey)
+    ]
     rows = screen(misfit, theta, causes, observer, proposed)
     picked: list[Hypothesis] = []
     places: set[tuple[str, str, str]] = set()
@@ -181,6 +190,11 @@ def search(
     scored = sorted((_candidate(f, g, without) for f, g in refits), key=lambda c: -c.gain)
     best = [_polished(misfit, c, without) for c in scored[:POLISHED]] + scored[POLISHED:]
     candidates = wrong_parameters(misfit, present, without, effects) + _steadied(calibration, best, without)
+    candidates += [
+        Candidate(cause, place, found, without - minus_two_log_evidence(found), direction)
+        for cause, place, direction, found in large_changes(misfit, present, effects)
+        if not mends(effects[cause], place, [(each.kind, each.location) for each in causes], survey)
+    ]
     return sorted(candidates, key=lambda c: -c.gain), rows
 
 
@@ -228,7 +242,8 @@ def _tried(
         found = fit(misfit, theta, causes, observer=observer, iterations=iterations, tolerance=tolerance)
     except (np.linalg.LinAlgError, ValueError):
         return None
-    return found if np.isfinite(found.objective) else None
+    finite = np.isfinite(found.objective) and np.all(np.isfinite(found.information))
+    return found if finite else None
 
 
 def _leading(fits: Sequence[Fit]) -> list[Fit]:
@@ -287,17 +302,21 @@ def wrong_parameters(
     misfit: Misfit, present: Fit, without: float, effects: Mapping[str, type[Effect]]
 ) -> list[Candidate]:
     """Masses, stiffnesses and dampings of the model that leave their tolerance, one by one and all together."""
+    assert misfit.survey is not None
+    named = [(each.kind, each.location) for each in present.causes]
     found, eye = [], np.eye(misfit.parameters.n)
     loose = np.linalg.eigh(misfit.parameters.precision)
     loose_directions = loose[1][:, loose[0] < 0.5]
     for group, cause in OWN_PARAMETERS.items():
         members = misfit.parameters.group(group)
         proposals = [(misfit.parameters.names[j].partition(" ")[2], eye[j]) for j in members]
-        proposals.append((EVERYWHERE, eye[members].sum(axis=0)))
+        if len(members) > 1:
+            proposals.append((EVERYWHERE, eye[members].sum(axis=0)))
         for place, direction in proposals:
             v = direction / np.linalg.norm(direction)
+            mending = cause in effects and mends(effects[cause], place, named, misfit.survey)
             fresh = np.linalg.norm(v - loose_directions @ (loose_directions.T @ v)) > 0.5
-            if cause in effects and fresh and abs(v @ present.theta) > 0.5:
+            if cause in effects and fresh and not mending and abs(v @ present.theta) > 0.5:
                 gain = without - minus_two_log_evidence(present, free=direction)
                 found.append(Candidate(cause, place, present, gain, direction))
     return found

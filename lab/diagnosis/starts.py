@@ -41,7 +41,7 @@ def moving(misfit: Misfit, fit: Fit) -> tuple[int, ...]:
     noise, is chi-square distributed.
     """
     plant = misfit.plant(fit.theta)
-    w, first, found = weights(fit.residual), 0, []
+    w, first, found = weights(fit.residual, misfit.colour), 0, []
     for number, n in enumerate(misfit.n_train):
         e = (fit.residual[:, first : first + n] * w[:, None]).ravel()
         first += n
@@ -100,6 +100,4 @@ def _swings(plant: Plant, dt: float, n_samples: int) -> Array:
     paths = tuple(replace(path, hum=(), limit=np.inf) for path in plant.output_paths)
     responder = ready(replace(plant, laws=(), tones=(), output_paths=paths), dt)
     silence = np.zeros((len(plant.inputs), n_samples))
-    return np.array(
-        [responder.outputs(silence, n_samples, initial=row) for row in np.eye(2 * plant.n_dofs)]
-    )
+    return np.array([responder.outputs(silence, n_samples, initial=row) for row in np.eye(2 * plant.n_dofs)])

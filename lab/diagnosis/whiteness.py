@@ -56,7 +56,9 @@ def whiteness(residual: Array, inputs: Array) -> Whiteness:
     )  # (n_lags, n_outputs)
     driven = inputs[np.std(inputs, axis=1) > 0] if inputs.size else np.zeros((0, n))
     u = _normalized(driven)
-    cross = np.array([[e[:, k:] @ row[: n - k] for k in range(LAGS)] for row in u]).reshape(len(u), LAGS, len(e))
+    cross = np.array([[e[:, k:] @ row[: n - k] for k in range(LAGS)] for row in u]).reshape(
+        len(u), LAGS, len(e)
+    )
     tests = own.size + cross.size
     limit = float(scipy.stats.norm.isf(LEVEL / (2 * max(tests, 1))))
     k, i = np.unravel_index(np.argmax(np.abs(own)), own.shape)

@@ -4,7 +4,9 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 
-from identification.recording import Recording
+import numpy as np
+
+from identification.recording import Array, Recording
 from lab.diagnosis.outcome import Alternative, Quantity
 from lab.diagnosis.whiteness import Whiteness
 from lab.effects.effect import EVERYWHERE, Effect
@@ -63,6 +65,18 @@ def inseparable(alternatives: Sequence[Alternative]) -> list[str]:
         for other in alternatives
         if other.advice
     ]
+
+
+def as_in_the_baseline(power: Array, recording: Recording) -> str:
+    """What is left, where that is no more than the baseline leaves."""
+    shares = ", ".join(
+        f"{100 * share:.2g} % of {channel.name}"
+        for channel, share in zip(recording.outputs, np.sqrt(power), strict=True)
+    )
+    return (
+        f"the model errs in the baseline too ({shares}, RMS), and no more is left here; the evidence counts samples with alike "
+        "errors as one"
+    )
 
 
 def left_over(left: Whiteness, recording: Recording) -> str:

@@ -35,6 +35,7 @@ class AttachedOscillator(AtBody, Effect):
     cause: ClassVar[str] = "attached_oscillator"
     units: ClassVar[dict[str, str]] = {"mass": "kg", "frequency_hz": "Hz", "damping_ratio": "1"}
     positive: ClassVar[tuple[str, ...]] = ("mass", "frequency_hz", "damping_ratio")
+    grows: ClassVar[bool] = True
     mass: float
     frequency_hz: float
     damping_ratio: float = 0.0
@@ -89,8 +90,10 @@ def with_oscillator(plant: Plant, body: Array, body_mass: float, oscillator: Att
     """The plant with one more degree of freedom for every direction in which the body's mass moves."""
     # Directions of the body: the part of M that it brings, per kilogram, is a sum of their outer products.
     weights, directions = np.linalg.eigh(body / body_mass)
-    directions = directions[:, weights > 0.5]
-    n, extra = plant.n_dofs, directions.shape[1]
+    n = plant.n_dofs
+    # Other oscillators may be there already.
+    directions = np.pad(directions[:, weights > 0.5], ((0, n - len(body)), (0, 0)))
+    extra = directions.shape[1]
     omega = 2 * pi * oscillator.frequency_hz
     relative = np.vstack([-directions, np.eye(extra)])  # extension of each oscillator's spring
     tie = relative @ relative.T

@@ -70,9 +70,52 @@ def test_a_withheld_cause_is_not_misnamed_as_explained(rig):
 
 
 def test_data_without_forces_are_refused(rig):
-    recording = simulate(rig, FreeDecay({"x1": 0.1}), sample_rate=5.0, duration=20.0)
+    decay = simulate(rig, FreeDecay({"x1": 0.1}), sample_rate=5.0, duration=20.0)
+    pushed = replace(decay, records=(replace(decay.records[0], kind="random"),))
     with pytest.raises(LabError, match="no measured input"):
-        diagnose(recording, rig)
+        diagnose(pushed, rig)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    ("cause", "location", "size"),
+    [("mass_change", "mass2", {"delta_mass": 0.1}), ("coulomb_friction", "x1", {"force": 5e-4})],
+)
+def test_a_free_decay_tells_a_cause_from_any_start(rig, cause, location, size):
+    bare = rig.connected(inputs=[], outputs=["acc1.x", "acc2.x", "acc3.x"])
+    recording = simulate(
+        instrument(EFFECTS[cause](location, **size).apply(bare), noise_percent=NOISE),
+        FreeDecay({"x1": 0.01, "x3": 0.01}),
+        sample_rate=10.0,
+        duration=100.0,
+        seed=1,
+    )
+    diagnosis = diagnose(recording, bare)
+    assert diagnosis.verdict == EXPLAINED
+    (finding,) = diagnosis.findings
+    assert (finding.effect.cause, finding.effect.location) == (cause, location)
+    for name, value in size.items():
+        found = finding.parameters[name]
+        # Four standard deviations: one chance in ten thousand.
+        assert abs(found.value - value) < 4 * found.std
+
+
+def test_a_record_that_does_not_begin_at_rest_is_noticed(rig):
+    recording = measured(rig)
+    late = replace(
+        recording,
+        records=(
+            replace(
+                recording.records[0],
+                inputs=np.asarray(recording.records[0].inputs)[:, 200:],
+                outputs=np.asarray(recording.records[0].outputs)[:, 200:],
+            ),
+        ),
+    )
+    diagnosis = diagnose(late, rig)
+    assert diagnosis.verdict == CONSISTENT
+    # Nothing but noise is left, from the first sample on.
+    assert diagnosis.errors.calibrated == pytest.approx(NOISE / 100, rel=0.1)
 
 
 def test_missing_samples_are_left_out(rig):
