@@ -207,7 +207,9 @@ def test_noise_moves_the_kept_model_in_proportion(name):
     assert errors[0] < 1e-4
 
 
-@pytest.mark.parametrize("kind", ["pulse", "sweep", "multisine", "random"])
+@pytest.mark.parametrize(
+    "kind", ["pulse", "sweep", "multisine", pytest.param("random", marks=pytest.mark.slow)]
+)
 def test_modes_and_response_at_five_per_cent_noise(kind):
     truth, rng, n = MODELS["truss"], np.random.default_rng(6), 4
     if kind == "pulse":
