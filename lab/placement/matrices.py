@@ -26,8 +26,9 @@ from lab.placement.outcome import Drive, Placement, Ranked
 from lab.placement.plan import Plan, alternatives, peak, total_duration
 from lab.rig import Rig
 
-LIMIT = 50_000
-"""Possible layouts up to this number are all compared, which proves the best."""
+WORK = 6e10
+"""Possible layouts are all compared, which proves the best, while their number times that of entries cubed is below this:
+half a minute."""
 LOOKED_AT = 5_000_000
 """Layouts up to this number are looked through for possible ones."""
 TOLD = 5
@@ -44,7 +45,7 @@ def place_matrices(
     *,
     criterion: str = "a",
     planned: Choice | None = None,
-    limit: int = LIMIT,
+    limit: int | None = None,
 ) -> Placement:
     """The layout that allows the least scatter of M, C and K, and its rivals.
 
@@ -55,7 +56,7 @@ def place_matrices(
         plan: the test.
         criterion: "a", "d" or "e", as in `MEASURES`.
         planned: sensors and actuators of a layout to be ranked too.
-        limit: number of possible layouts up to which all are compared.
+        limit: number of possible layouts up to which all are compared; by their cost when None.
 
     Raises:
         LabError: no layout of these candidates can give M, C and K, or there are too many entries.
@@ -68,7 +69,8 @@ def place_matrices(
         len(actuators) - len(actuators.fixed), n_actuators - len(actuators.fixed)
     )
     choices = possible_layouts(contest) if n_layouts <= LOOKED_AT else []
-    proven = n_layouts <= LOOKED_AT and len(choices) <= limit
+    most = WORK / len(contest.units) ** 3 if limit is None else limit
+    proven = n_layouts <= LOOKED_AT and len(choices) <= most
     if proven:
         if not choices:
             raise LabError(impossible(contest))

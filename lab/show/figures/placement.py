@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 from matplotlib.figure import Figure
+from matplotlib.ticker import FuncFormatter
 
 from lab.placement.outcome import Placement
 from lab.rig import Rig
@@ -54,6 +55,8 @@ def ranking_figure(placement: Placement) -> Drawing | None:
         axes.set_xlabel("rank")
         axes.set_ylabel("figure [%]" if unit == 100 else "figure")
         axes.set_yscale("log")
+        axes.yaxis.set_major_formatter(FuncFormatter(_number))
+        axes.yaxis.set_minor_formatter(FuncFormatter(_few))
         figure.legend(loc="outside upper center", ncols=3)
 
     caption = f"All {n} layouts by rank: {p.measure}. Smaller is better."
@@ -132,12 +135,26 @@ def _arrows(
         if named:
             axes.annotate(  # type: ignore[attr-defined]
                 plain(mark.name, 16),
-                (mark.point[across] + 1.15 * direction[across], mark.point[up] + 1.15 * direction[up]),
+                (mark.point[across] + 1.05 * direction[across], mark.point[up] + 1.05 * direction[up]),
                 color=color,
-                ha="center",
-                va="center",
+                ha=_side(direction[across], "left", "right"),
+                va=_side(direction[up], "bottom", "top"),
                 fontsize=7,
             )
+
+
+def _side(component: float, positive: str, negative: str) -> str:
+    """How a label is aligned so that it begins where an arrow ends."""
+    return "center" if abs(component) < 1e-9 else positive if component > 0 else negative
+
+
+def _number(value: float, place: int | None = None) -> str:
+    return f"{value:g}"
+
+
+def _few(value: float, place: int | None = None) -> str:
+    """Ticks between powers of ten: two and five alone carry numbers."""
+    return f"{value:g}" if f"{value:e}"[0] in "25" else ""
 
 
 def confusion_figure(placement: Placement) -> Drawing | None:

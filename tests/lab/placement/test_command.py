@@ -15,7 +15,9 @@ from lab.placement.place import place
 from lab.placement_summary import placement_summary
 from lab.show.figures.placement import draw_placement
 from lab.show.marks import actuator_marks, sensor_marks
+from lab.show.rerun_log.placement import write_placement_rrd
 from tests.lab.placement.structures import row_of_masses
+from tests.lab.test_show_rerun import Read
 
 
 def status(*words):
@@ -149,3 +151,13 @@ def test_the_same_command_gives_the_same_bytes(model):
         place_file("row.xml", folder, 2, n_actuators=2, target="matrices")
     for name in ("placement.json", "report.html"):
         assert (model / "one" / name).read_bytes() == (model / "two" / name).read_bytes()
+
+
+def test_the_viewer_shows_the_chosen_channels_as_arrows(tmp_path):
+    rig = row_of_masses(3)
+    placement = place(rig, 2, n_actuators=1)
+    write_placement_rrd(tmp_path / "run.rrd", placement, rig)
+    read = Read(tmp_path / "run.rrd")
+    arrows = {path for path in read.entities if "/sensors/" in path or "/actuators/" in path}
+    chosen = [f"sensors/{name}" for name in placement.sensors] + [f"actuators/{placement.actuators[0]}"]
+    assert {path.replace("\\", "").removeprefix("/placement/structure/") for path in arrows} == set(chosen)
