@@ -131,7 +131,10 @@ def paper(name: str, n: int) -> None:
     task = Task(tomllib.loads(load_scenario(name).text), "", {})
     perform(task, [Run(0, {"diagnosis": None}, 0)])
     begun = time.process_time()
-    perform(task, [Run(k, {}, k) for k in range(n)])
+    lines = perform(task, [Run(k, {}, k) for k in range(n)])
+    failed = [error for line in lines if (error := json.loads(line).get("error"))]
+    if failed:
+        raise SystemExit(f"{name}: {failed[0]}")
     each = (time.process_time() - begun) / n
     hours = MILLION * each / 3600
     times = "; ".join(f"{cores} cores {hours / cores / 0.95:.1f} h" for cores in (64, 1000))
