@@ -1,0 +1,57 @@
+"""Baseline: what a known state teaches about the errors of the model itself."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+import scipy.stats
+
+from identification.recording import Array
+from lab.diagnosis.calibrate import Calibration
+from lab.diagnosis.colour import colour
+from lab.diagnosis.fit import Fit, fit
+from lab.diagnosis.misfit import Misfit
+
+LEVEL = 1e-3
+"""Probability that as little as a baseline leaves is taken for more."""
+
+
+@dataclass(frozen=True, eq=False)
+class Baseline:
+    """A model calibrated on a known state, and what that leaves.
+
+    Attributes:
+        fit: parameters with error bars that know how alike the errors are.
+        power: residual over signal power of every output.
+        colour: samples of the residual that count as one.
+        samples: of the residual, counted so.
+    """
+
+    fit: Fit
+    power: Array
+    colour: float
+    samples: float
+
+    @classmethod
+    def of(cls, calibration: Calibration) -> Baseline:
+        """The baseline of a model calibrated on a recording of the known state."""
+        residual = calibration.fit.residual
+        alike = colour(residual)
+        coloured = replace(calibration.misfit, colour=alike)
+        found = fit(coloured, calibration.fit.theta, iterations=2)
+        return cls(found, _power(coloured, found), alike, residual.shape[1] / alike)
+
+    def covers(self, misfit: Misfit, found: Fit) -> bool:
+        """Whether a fit of another recording leaves no more of its signals than the baseline of its own.
+
+        Errors of the model grow with the signal, so shares are compared, by an F-test (Bonferroni over outputs).
+        """
+        power = _power(misfit, found)
+        samples = max(found.residual.shape[1] / self.colour, 1.0)
+        limit = scipy.stats.f.isf(LEVEL / power.size, samples, max(self.samples, 1.0))
+        return bool(np.all(power <= limit * self.power))
+
+
+def _power(misfit: Misfit, found: Fit) -> Array:
+    return np.asarray(np.mean(found.residual**2, axis=1) / np.nanmean(misfit.measured**2, axis=1))

@@ -1,0 +1,80 @@
+"""Changes: masses, stiffnesses and dampings so far from the model's that no step from there would find them."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from dataclasses import replace
+
+import numpy as np
+
+from identification.recording import Array
+from lab.diagnosis.fit import Fit, fit, objective
+from lab.diagnosis.misfit import Misfit, Parameters
+from lab.diagnosis.starts import best_starts
+from lab.effects.effect import EVERYWHERE, Effect
+
+OWN_PARAMETERS = {"mass": "mass_change", "stiffness": "stiffness_change", "damping": "damping_change"}
+FACTORS = np.geomspace(1 / 4, 4, 28)
+"""So close that a lightly damped resonance is not stepped over in a window of ten swings."""
+DAMPING_FACTORS = np.geomspace(1 / 16, 16, 16)
+WINDOW = 1024
+"""Samples of every record on which factors are tried."""
+WORTH = 20.0
+"""-2 log posterior that a trial value must gain to be followed."""
+FOLLOWED = 4
+
+
+def directions(misfit: Misfit, effects: Mapping[str, type[Effect]]) -> Iterator[tuple[str, str, Array]]:
+    """Cause, location and direction among the parameters of every change of what the model has already."""
+    eye = np.eye(misfit.parameters.n)
+    for group, cause in OWN_PARAMETERS.items():
+        members = misfit.parameters.group(group)
+        if cause in effects:
+            for j in members:
+                yield cause, misfit.parameters.names[j].partition(" ")[2], eye[j]
+            if len(members) > 1:
+                yield cause, EVERYWHERE, eye[members].sum(axis=0)
+
+
+def large_changes(
+    misfit: Misfit, present: Fit, effects: Mapping[str, type[Effect]]
+) -> list[tuple[str, str, Array, Fit]]:
+    """Cause, location, direction and fit of the likeliest large changes; none where the data do not ask for any.
+
+    Each is tried at a few factors and followed from the best, its prior lifted: a doubled mass moves a resonance so far that
+    slopes at the model's own value point nowhere.
+    """
+    tried = []
+    window = tuple(min(n, WINDOW) for n in misfit.n_train)
+
+    def level(theta: Array, parameters: Parameters) -> float:
+        e = misfit.residual(theta, present.causes, observer=present.observer, n_train=window)
+        return objective(e, theta, parameters.precision, misfit.colour)
+
+    reference = level(present.theta, misfit.parameters)
+    for cause, location, direction in directions(misfit, effects):
+        lifted = misfit.parameters.lifted(direction)
+        for factor in DAMPING_FACTORS if cause == "damping_change" else FACTORS:
+            theta = present.theta + np.log(factor) * direction / misfit.parameters.widths
+            theta = _restarted(misfit, theta)
+            tried.append((level(theta, lifted), cause, location, direction, theta))
+    best: dict[tuple[str, str], tuple[float, str, str, Array, Array]] = {}
+    for trial in sorted(tried, key=lambda trial: trial[0]):
+        best.setdefault(trial[1:3], trial)
+    found = []
+    for reached, cause, location, direction, theta in list(best.values())[:FOLLOWED]:
+        if reached < reference - WORTH:
+            changed = replace(misfit, parameters=misfit.parameters.lifted(direction))
+            refit = fit(changed, theta, present.causes, observer=present.observer, iterations=15)
+            found.append((cause, location, direction, refit))
+    return found
+
+
+def _restarted(misfit: Misfit, theta: Array) -> Array:
+    """The parameters with starts that suit them: those of another model fit nothing."""
+    p = misfit.parameters
+    starts = best_starts(replace(misfit, twin=replace(misfit.twin, plant=misfit.plant(theta))))
+    found = [starts[record] for record in p.started]
+    return np.concatenate([theta[: p.n_factors], *found]) / np.concatenate(
+        [np.ones(p.n_factors), p.widths[p.n_factors :]]
+    )
