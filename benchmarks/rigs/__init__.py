@@ -1,0 +1,1 @@
+"""Published rigs, one file each: what is known of them, what the lab says."""

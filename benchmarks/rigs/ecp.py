@@ -1,0 +1,169 @@
+"""ECP carts: loads, springs, motor and dry friction, from free releases and motor-driven tests."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import replace
+
+import numpy as np
+
+import lab
+from benchmarks.rigs.row import RIGS, Row, measured, told
+from identification.recording import Array, Record, Recording
+from lab.effects.edits import with_law, with_mass
+from lab.rig import Rig
+
+FOLDER = "ecp_carts"
+DETACHED, ATTACHED = "free_release_motor_detached", "free_release_motor_attached"
+RELEASED = {"mass": 0.025, "stiffness": 0.05, "damping": 0.3}
+"""How well the documented values are known, relative: the cart to 0.014 kg, springs as two estimates differ."""
+DRIVEN = {"mass": 0.13, "stiffness": 0.1, "damping": 0.3}
+"""The same with the motor, whose own mass and force per ampere are known to 13 and 14 %."""
+LOAD = 0.986
+SPRINGS = {"low": 175.3, "med": 315.5, "high": 712.6}
+SILENT = ("unmeasured_force", "line_hum", "attached_oscillator")
+"""What a cart let go by hand cannot have: nothing pushes it, nothing hangs on it, and encoders do not hum."""
+STILL = 4e-5
+"""A cart that moves less than two counts of the encoder in a quarter of a second stands [m]."""
+
+
+def releases(position: Array, dt: float) -> list[tuple[int, int]]:
+    """First and last sample of every free decay: from the first swing through zero until the cart stands."""
+    speed = np.abs(np.gradient(position, dt))
+    fast = speed[:-1] > 0.5 * np.max(speed)
+    crossings = np.flatnonzero((position[:-1] * position[1:] <= 0) & fast)
+    begins = [c for i, c in enumerate(crossings) if i == 0 or c - crossings[i - 1] > 2 / dt]
+    window = int(0.25 / dt)
+    spread = np.ptp(np.lib.stride_tricks.sliding_window_view(position, window), axis=1)
+    still = np.append(np.flatnonzero(spread < STILL), position.size)
+    return [(int(a), int(still[np.searchsorted(still, a)])) for a in begins]
+
+
+def released(*names: str, folder: str = DETACHED) -> Recording:
+    """The free decays of several recordings, one record each."""
+    records = []
+    for name in names:
+        whole = measured(f"{FOLDER}/{folder}/{name}", "ecp_carts/free_release.toml")
+        position = np.asarray(whole.records[0].outputs[0])
+        for a, b in releases(position, whole.dt):
+            records.append(Record("free_decay", np.zeros((0, b - a)), position[None, a:b]))
+    return replace(whole, records=tuple(records))
+
+
+def driven(
+    name: str, recipe: str = "random_one_cart", start: float = 4.5, stop: float | None = None
+) -> Recording:
+    """A motor-driven test from the instant its motor is switched on [s]."""
+    folder = recipe if recipe.startswith(("random", "pulses")) else ""
+    whole = measured(f"{FOLDER}/{folder}/{name}", f"ecp_carts/{recipe}.toml")
+    record, a, b = whole.records[0], int(start / whole.dt), None if stop is None else int(stop / whole.dt)
+    part = Record(record.kind, record.inputs[:, a:b], record.outputs[:, a:b])
+    return replace(whole, records=(part,))
+
+
+def cart(spring: str, load: float = 0.0) -> Rig:
+    """One cart without motor, on a spring, with a load."""
+    rig = Rig.load(RIGS / FOLDER / "one_cart_detached.xml")
+    rig = with_law(rig, "spring1", stiffness=[SPRINGS[spring], 0, 0], damping=[0.9, 0, 0])
+    return with_mass(rig, "cart1", (0.5685 + load) / 0.5685)
+
+
+def free(recording: Recording, rig: Rig, baseline: Recording | None = None) -> lab.Diagnosis:
+    """What the lab says of free releases."""
+    possible = {name: kind for name, kind in lab.EFFECTS.items() if name not in SILENT}
+    return lab.diagnose(recording, rig, baseline=baseline, widths=RELEASED, effects=possible)
+
+
+FREE = {
+    ("low", 0.0): ("Klow_Hand_Nomass", "Klow_Hand_Nomass2", "Klow_hand_Nomass3"),
+    ("med", 0.0): ("Kmed_hand_Nomass", "Kmed_hand_Nomass2", "Kmed_hand_Nomass3"),
+    ("high", 0.0): ("Khigh_hand_Nomass", "Khigh_hand_Nomass2"),
+    ("low", LOAD): ("Klow_Hand_2mass", "Klow_hand_2mass2"),
+    ("high", LOAD): ("Khigh_hand_2mass", "Khigh_hand_2mass2"),
+}
+
+
+def friction() -> Iterator[Row]:
+    """Dry friction or more viscous damping?"""
+    for (spring, load), names in FREE.items():
+        diagnosis = free(released(*names), cart(spring, load))
+        levels = []
+        for finding in diagnosis.findings:
+            p = finding.parameters
+            if finding.effect.cause == "hysteresis":
+                levels.append(f"level {p['stiffness'].value * p['yield_displacement'].value:.3f} N")
+        yield told(
+            "ECP, 1 cart, released",
+            f"What stops it ({spring} spring, {load:g} kg on it)?",
+            "dry friction of 0.04 to 0.08 N",
+            diagnosis,
+            show=["damping spring1"],
+            remark="; ".join(levels),
+        )
+
+
+def repeats() -> Iterator[Row]:
+    """The same state once more."""
+    for (spring, load), names in FREE.items():
+        known = free(released(*names[:-1]), cart(spring, load)).extended
+        again = free(released(names[-1]), known, released(*names[:-1]))
+        question = f"Same state again ({spring} spring, {load:g} kg on it)?"
+        yield told("ECP, 1 cart, released", question, "nothing changed", again)
+    for name, middle in (("KhNoM", 17.5), ("KmNoM", 17.0), ("Kh2M", 21.0), ("Kl2M", 18.0)):
+        rig = Rig.load(RIGS / FOLDER / "one_cart.xml")
+        first, second = driven(name, stop=middle), driven(name, start=middle)
+        diagnosis = lab.diagnose(second, rig, baseline=first, widths=DRIVEN)
+        yield told("ECP, 1 cart, motor", f"Same state, second half ({name})?", "nothing changed", diagnosis)
+
+
+def changed_when_released() -> Iterator[Row]:
+    """Loads, springs and the motor, from free releases."""
+    plain = {
+        state: free(released(*names), cart(*state)).extended for state, names in FREE.items() if not state[1]
+    }
+    for state, base, known in (
+        (("high", LOAD), ("high", 0.0), "+0.986 kg on cart 1"),
+        (("low", LOAD), ("low", 0.0), "+0.986 kg on cart 1"),
+        (("high", 0.0), ("med", 0.0), "spring 2.26 times as stiff"),
+        (("low", 0.0), ("med", 0.0), "spring 0.556 times as stiff"),
+    ):
+        diagnosis = free(released(*FREE[state]), plain[base], released(*FREE[base]))
+        question = f"What changed from {base[0]} spring, {base[1]:g} kg?"
+        remark = "a free decay knows k/m only: mass and stiffness cannot be told apart"
+        yield told("ECP, 1 cart, released", question, known, diagnosis, remark=remark)
+    attached = released("Hard_nomass", folder=ATTACHED)
+    diagnosis = free(attached, plain["high", 0.0], released(*FREE["high", 0.0]))
+    yield told(
+        "ECP, 1 cart, released",
+        "What changed when the motor was attached (high spring)?",
+        "+0.322 kg, 8 to 10 N s/m instead of 0.7 to 1.1",
+        diagnosis,
+        show=["damping spring1"],
+    )
+
+
+def changed_when_driven() -> Iterator[Row]:
+    """Loads and springs, from motor-driven tests."""
+    rig = Rig.load(RIGS / FOLDER / "one_cart.xml")
+    for name, base, known in (
+        ("Kh2M", "KhNoM", "+0.986 kg on cart 1"),
+        ("KmNoM", "KhNoM", "spring 0.47 times as stiff"),
+        ("KhNoM", "KmNoM", "spring 2.12 times as stiff"),
+        ("Kl2M", "KmNoM", "+0.986 kg, spring 0.64 times as stiff"),
+    ):
+        diagnosis = lab.diagnose(driven(name), rig, baseline=driven(base), widths=DRIVEN)
+        yield told("ECP, 1 cart, motor", f"What changed from {base} to {name}?", known, diagnosis)
+    rig = Rig.load(RIGS / FOLDER / "two_carts.xml")
+    for name, base, known in (
+        ("KlKh-noM-2M", "KlKh-noM-noM", "+0.986 kg on cart 2"),
+        ("KhKm-1M-1M", "KhKm-noM-noM", "+0.493 kg on each cart"),
+    ):
+        first, second = (driven(n, "random_two_carts") for n in (base, name))
+        diagnosis = lab.diagnose(second, rig, baseline=first, widths=DRIVEN)
+        yield told("ECP, 2 carts, motor", f"What changed from {base} to {name}?", known, diagnosis)
+
+
+def rows() -> Iterator[Row]:
+    """All rows of this rig."""
+    for part in (friction, repeats, changed_when_released, changed_when_driven):
+        yield from part()
