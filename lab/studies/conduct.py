@@ -74,8 +74,9 @@ def _prepare(folder: Path, study: Study, force: bool) -> None:
     book = folder / journal.NAME
     if force and book.is_file():
         with journal.Journal(book):
-            # Nobody else is writing it.
-            pass
+            # Nobody else is writing it, so what a kill left half written is of no use.
+            for half in folder.glob(".*.part"):
+                half.unlink()
     if force or not book.is_file():
         with output_folder(folder, force=force) as hidden:
             journal.create(hidden / journal.NAME, study)
@@ -134,5 +135,7 @@ def _tell(folder: Path, study: Study, command: str) -> Outcome:
         found = statistics(file)
     absent = tuple(name for name in study.collect if f"collected/{name}" not in columns.present)
     outcome = Outcome(study, tuple(found), dict(columns.errors), columns.n_failed, absent)
-    write_study_report(folder / "report.html", outcome, command=command)
+    hidden = folder / ".report.html.part"
+    write_study_report(hidden, outcome, command=command)
+    hidden.replace(folder / "report.html")
     return outcome
