@@ -24,6 +24,8 @@ from identification.regression import BLOCK, FROM_REST
 from identification.residual_scatter import redrawn
 from identification.systems import Realization, StateSpace
 
+MOST_GROWTH = 1e6
+"""Growth over a record beyond which an unstable model cannot be fitted to it."""
 DRAWS = 60
 """Draws of the noise: enough for standard deviations to 9 %."""
 
@@ -201,6 +203,11 @@ def _with_fitted_inputs(tangent: Tangent, recording: Recording, draws: list[list
             for record, noise in zip(recording.records, draw, strict=True)
         )
         moved = replace(system, A=system.A + tangent.A_theta[k], C=system.C + tangent.C_theta[k])
+        fastest = np.max(np.abs(np.linalg.eigvals(moved.A)))
+        if not np.isfinite(fastest) or fastest ** max(r.n_samples for r in recording.records) > MOST_GROWTH:
+            raise IdentificationError(
+                "the residual is so large that a pole could as well be unstable; lower the order or look for nonlinearity"
+            )
         fitted = fit_inputs(moved, replace(recording, records=records))
         dB[k], dD[k] = fitted.B - system.B, fitted.D - system.D
     return replace(tangent, B_theta=dB, D_theta=dD)
