@@ -99,9 +99,7 @@ def rows() -> Iterator[Row]:
         for amplitude in ("0.5", "1", "1.5"):
             place = f"friction_damper/0.5Hz{tension}lbtension{amplitude}amplitude.json"
             record = measured(place, "friction_damper/characterization.toml").records[0]
-            x, force, v = (
-                row[::EVERY] for row in (record.inputs[0], record.outputs[0], record.outputs[1])
-            )
+            x, force, v = (row[::EVERY] for row in (record.inputs[0], record.outputs[0], record.outputs[1]))
             results = {name: fitted(law, scale, x, v, force) for name, (law, scale) in LAWS.items()}
             best = min(results, key=lambda name: results[name].error)
             p, s = results[best].values, results[best].stds

@@ -19,7 +19,7 @@ CASES = {
     "ecp_carts/pulses_steps_one_cart.toml": ("ecp_carts/[pa]*_one_cart", "*", "x1", 2, 0.01 / 560),
     "ecp_carts/three_carts.toml": ("ecp_carts/three_carts", "*", "x2", 5, 0.01),
     "ecp_carts/current_sensor_saturation.toml": ("ecp_carts/current*", "*", "x1", 3, 0.01),
-    "unison_tower/wn.toml": ("unison_tower", "wn_*.dat", "floor5", 2, -9.8),
+    "unison_tower/wn.toml": ("unison_tower", "wn_*.dat", "floor5.x", 2, -9.8),
 }
 """Recipe: folders, recordings in them, an output, its column counted from 0, SI per number."""
 
