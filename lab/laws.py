@@ -13,7 +13,7 @@ from contextlib import contextmanager
 import mujoco
 import numpy as np
 
-from lab.mjcf import number
+from lab.mjcf import free_name, number
 from lab.ports import is_law
 from lab.rig import Rig, Spring
 
@@ -79,6 +79,7 @@ def _drifting(model: mujoco.MjModel, data: mujoco.MjData, actuator: int) -> floa
 def _with_actuator(rig: Rig, element: ET.Element) -> Rig:
     def edit(root: ET.Element) -> None:
         found = root.findall("actuator")
+        element.set("name", free_name(root, element.get("name", "")))
         (found[-1] if found else ET.SubElement(root, "actuator")).append(element)
 
     return rig.edited(edit)

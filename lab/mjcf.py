@@ -148,3 +148,11 @@ def _expand_includes(element: ET.Element, folder: Path, read_files: set[Path]) -
         element.remove(child)
         for part in reversed(list(included)):
             element.insert(position, part)
+
+
+def free_name(root: ET.Element, name: str) -> str:
+    """The name, or where an element has it, the name with the first number behind a # that none has."""
+    taken = {element.get("name") for element in root.iter()}
+    return next(
+        each for each in (name, *(f"{name}#{i}" for i in range(2, len(taken) + 3))) if each not in taken
+    )

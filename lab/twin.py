@@ -242,7 +242,7 @@ def _frictions(rig: Rig, rows: Array) -> list[Law]:
 def _user_laws(rig: Rig, rows: Array) -> list[Law]:
     m, found = rig.model, []
     for i in np.flatnonzero(is_law(m)):
-        kind, _, name = m.actuator(i).name.partition("@")
+        kind, _, name = m.actuator(i).name.partition("#")[0].partition("@")
         row = rows[[spring.name for spring in rig.springs].index(name)]
         if kind == laws.HYSTERESIS:
             found.append(Law(forces.BOUC_WEN, row, tuple(float(x) for x in m.actuator_dynprm[i, :2])))

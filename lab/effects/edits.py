@@ -8,7 +8,7 @@ from collections.abc import Callable, Sequence
 import numpy as np
 
 from lab.errors import RigError
-from lab.mjcf import number
+from lab.mjcf import free_name, number
 from lab.rig import Rig, Spring
 from lab.twin import movable
 
@@ -70,6 +70,7 @@ def with_tendon(rig: Rig, tendon: ET.Element) -> Rig:
     """The rig with one more tendon."""
 
     def edit(root: ET.Element) -> None:
+        tendon.set("name", free_name(root, tendon.get("name", "")))
         section(root, "tendon").append(tendon)
 
     return rig.edited(edit)
