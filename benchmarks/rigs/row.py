@@ -8,6 +8,7 @@ from pathlib import Path
 
 import lab
 from identification.recording import Recording
+from lab.effects.effect import EVERYWHERE
 from lab.files.importing import Imported, read_foreign
 from lab.files.recipe import load_recipe
 
@@ -70,8 +71,8 @@ def told(
         show: calibrated parameters to tell besides those of the findings.
         remark: where it is wrong or undecided, and why.
     """
-    named = [f"`{f.effect.cause}` at {f.effect.location}" for f in diagnosis.findings]
-    rivals = [f"`{a.cause}` at {a.location}" for a in diagnosis.alternatives if a.advice]
+    named = [_placed(f.effect.cause, f.effect.location) for f in diagnosis.findings]
+    rivals = [_placed(a.cause, a.location) for a in diagnosis.alternatives if a.advice]
     says = f"{diagnosis.verdict}{': ' if named else ''}{', '.join(named)}"
     if rivals:
         says += f"; not separable from the first: {', '.join(rivals)}"
@@ -86,3 +87,7 @@ def told(
     if diagnosis.findings:
         gain += "; gain " + ", ".join(f"{f.holdout_gain:.2f}" for f in diagnosis.findings)
     return Row(rig, question, known, says, "; ".join(sizes), gain, remark)
+
+
+def _placed(cause: str, location: str) -> str:
+    return f"`{cause}` everywhere" if location == EVERYWHERE else f"`{cause}` at {location}"
