@@ -40,7 +40,7 @@ FLOOR_SAYS = "The noise floor is drawn as the same share of the signal in every 
 def draw_diagnosis(diagnosis: Diagnosis, recording: Recording) -> list[Drawing]:
     """All figures that the data support, in the order of the report."""
     if diagnosis.spectra is not None:
-        from lab.show.figures.spectra import draw_spectra
+        from lab.show.figures.spectral import draw_spectra
 
         return [draw_spectra(diagnosis, diagnosis.spectra)]
     rows = worst_outputs(diagnosis)
