@@ -27,7 +27,7 @@ import scipy.signal
 
 from identification.recording import Array
 from lab.errors import RigError, UnknownNameError
-from lab.filters import band_limited_lag, held_low_pass, low_pass
+from lab.filters import band_limited_delay, band_limited_lag, held_low_pass, low_pass
 
 Process = Callable[[Array], Array]
 """Turns the next block of a signal into what leaves the stage; remembers the blocks before."""
@@ -178,6 +178,23 @@ class BandLimitedLag(Stage):
 
     def start(self, dt: float, rng: np.random.Generator, rms: float) -> Process:
         return lambda x: band_limited_lag(x, 1 / (2 * np.pi * self.corner_hz), dt)
+
+
+@dataclass(frozen=True)
+class BandLimitedDelay(Stage):
+    """Gives a signal that an ideal anti-alias filter has limited `delay` seconds later."""
+
+    name: ClassVar[str] = "band_limited_delay"
+    whole_record: ClassVar[bool] = True
+    not_negative: ClassVar[tuple[str, ...]] = ("delay",)
+    delay: float
+
+    @property
+    def needs_samples(self) -> bool:
+        return True
+
+    def start(self, dt: float, rng: np.random.Generator, rms: float) -> Process:
+        return lambda x: band_limited_delay(x, self.delay, dt)
 
 
 @dataclass(frozen=True)
@@ -347,6 +364,7 @@ STAGES: dict[str, type[Stage]] = {
         Lag,
         HeldLag,
         BandLimitedLag,
+        BandLimitedDelay,
         LowPass,
         Delay,
         Hum,

@@ -96,6 +96,15 @@ def band_limited_lag(signal: Array, time_constant: float, dt: float) -> Array:
     Whatever an ideal anti-alias filter leaves of a signal is a sum of tones, each of which the low-pass divides by
     1 + 2πi f τ.
     """
+    return _every_tone(signal, dt, lambda f: 1 / (1 + 2j * np.pi * f * time_constant))
+
+
+def band_limited_delay(signal: Array, delay: float, dt: float) -> Array:
+    """A sampled signal, followed by as much silence, given later: exact below half the sample rate."""
+    return _every_tone(signal, dt, lambda f: np.exp(-2j * np.pi * f * delay))
+
+
+def _every_tone(signal: Array, dt: float, response: Callable[[Array], np.ndarray]) -> Array:
     size = 2 * signal.shape[-1]
-    tones = np.fft.rfft(signal, size) / (1 + 2j * np.pi * np.fft.rfftfreq(size, dt) * time_constant)
+    tones = np.fft.rfft(signal, size) * response(np.asarray(np.fft.rfftfreq(size, dt)))
     return np.asarray(np.fft.irfft(tones, size)[..., : signal.shape[-1]])

@@ -9,7 +9,7 @@ import numpy as np
 import scipy.signal
 
 from identification.recording import Array
-from lab.filters import band_limited_lag
+from lab.filters import band_limited_delay, band_limited_lag
 
 ORDER = {
     "actuators": ("held_lag", "gain", "saturation", "delay", "lag"),
@@ -28,6 +28,7 @@ class Path:
         lag: time constant of a first-order lag [s]; it has a state of its own in the plant.
         held_lag: the same for an input whose lagging value is held over each sample, as a digital filter gives it [s].
         band_limited_lag: the same for a recorded channel, behind an ideal anti-alias filter [s].
+        band_limited_delay: of a recorded channel behind an ideal anti-alias filter [s].
         limit: saturation either way [unit of the channel].
         hum: sines added, each (frequency [Hz], sine, cosine).
     """
@@ -37,6 +38,7 @@ class Path:
     lag: float = 0.0
     held_lag: float = 0.0
     band_limited_lag: float = 0.0
+    band_limited_delay: float = 0.0
     limit: float = float("inf")
     hum: tuple[tuple[float, float, float], ...] = ()
 
@@ -78,14 +80,17 @@ def recorded(paths: Sequence[Path], order: Sequence[int], outputs: Array, dt: fl
     for path, signal in zip(paths, signals, strict=True):
         if path.band_limited_lag:
             signal[:] = band_limited_lag(signal, path.band_limited_lag, dt)
+        if path.band_limited_delay:
+            signal[:] = band_limited_delay(signal, path.band_limited_delay, dt)
     return signals
 
 
 def structural(paths: Sequence[Path], order: Sequence[int], recorded: Array, dt: float) -> Array:
     """What the structure's readings were, as far as a recording tells: the paths undone, NaN where they cannot be."""
     readings = np.array(recorded)
-    # What has been averaged away does not come back.
-    readings[[i for i, path in enumerate(paths) if path.band_limited_lag]] = np.nan
+    # What has been averaged away, or comes too late, does not come back.
+    lost = [i for i, path in enumerate(paths) if path.band_limited_lag or path.band_limited_delay]
+    readings[lost] = np.nan
     if order:
         readings[list(order)] = recorded
     for i, path in enumerate(paths):

@@ -269,6 +269,8 @@ def _behind_chain(rig: Rig, plant: Plant) -> Plant:
             plant = plant.with_output(
                 names.index(stage.channel), band_limited_lag=1 / (2 * np.pi * stage.corner_hz)
             )
+        if isinstance(stage, stages.BandLimitedDelay):
+            plant = plant.with_output(names.index(stage.channel), band_limited_delay=stage.delay)
     order = list(range(len(names)))
     for a, b in chain.swaps:
         i, j = names.index(a), names.index(b)

@@ -28,6 +28,7 @@ from lab.diagnosis.outcome import (
     Finding,
     Quantity,
 )
+from lab.diagnosis.revise import renamed, settled
 from lab.diagnosis.search import Candidate, search, wrong_parameters
 from lab.diagnosis.starts import best_starts, free_decays, starts_of, with_starts
 from lab.diagnosis.unlearnable import unlearnable
@@ -43,6 +44,8 @@ from lab.rig import Rig
 from lab.twin import twin
 
 MOST_FINDINGS = 4
+UNSETTLED = 30.0
+"""-2 log posterior by which a fit must fall to be taken for one that had not converged."""
 LAW_SUBSTEPS = 12
 """Substeps of further searches where a law was found, so that its numerics are not taken for another cause."""
 FINE_SUBSTEPS = 24
@@ -129,6 +132,11 @@ def diagnose(
     while len(state.accepted) < MOST_FINDINGS:
         tell("searching for causes" if not state.accepted else f"searching on, {len(state.accepted)} found")
         candidates, screened = search(state.calibration, state.fit, effects)
+        if candidates:
+            better = settled(state.misfit, state.fit, candidates[0].fit)
+            if better.objective < state.fit.objective - UNSETTLED:
+                state = _settled(state, better, rig)
+                candidates, screened = search(state.calibration, state.fit, effects)
         first = first or candidates
         threshold = evidence_threshold(len(screened))
         if not candidates or candidates[0].gain < threshold:
@@ -137,6 +145,9 @@ def diagnose(
         finely = _finely(state)
         covered = known is not None and known.covers(finely.misfit, finely.fit)
         left = whiteness(finely.fit.residual, inputs)
+        if len(state.accepted) > 1 and not left.passed:
+            state = _renamed(state, effects)
+            left = whiteness(_finely(state).fit.residual, inputs)
         if (left.passed or covered) and not any(c.gain > threshold for c in _still_wrong(state, effects)):
             break
     state = _finely(_without_idle(state))
@@ -206,6 +217,28 @@ def _with(state: State, candidate: Candidate, rig: Rig) -> State:
     calibration = Calibration(misfit, refit, refit, 0.0)
     held_out = (*state.held_out, held_out_error(misfit, refit))
     return State(calibration, refit, (*state.accepted, candidate), state.origin, held_out)
+
+
+def _settled(state: State, better: Fit, rig: Rig) -> State:
+    """The state with a better fit of the causes so far."""
+    misfit = state.misfit
+    misfit = replace(misfit, survey=survey_of(misfit, rig, better.theta, better.residual))
+    calibration = Calibration(misfit, better, better, 0.0)
+    held_out = (*state.held_out[:-1], held_out_error(misfit, better))
+    origin = state.origin if state.accepted else better
+    return State(calibration, better, state.accepted, origin, held_out)
+
+
+def _renamed(state: State, effects: Mapping[str, type[Effect]]) -> State:
+    """The state with causes that were named while others were missing exchanged for better ones at their places."""
+    accepted, found = list(state.accepted), state.fit
+    positions = [i for i, candidate in enumerate(accepted) if candidate.direction is None]
+    for number, position in enumerate(positions):
+        found = renamed(state.misfit, found, number, effects)
+        cause = found.causes[number]
+        accepted[position] = replace(accepted[position], cause=cause.kind.cause, location=cause.location)
+    calibration = replace(state.calibration, fit=found, guided=found)
+    return replace(state, fit=found, accepted=tuple(accepted), calibration=calibration)
 
 
 def _finely(state: State) -> State:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -189,7 +189,12 @@ def search(
     refits = _refitted(calibration, theta, present, picked)
     scored = sorted((_candidate(f, g, without) for f, g in refits), key=lambda c: -c.gain)
     best = [_polished(misfit, c, without) for c in scored[:POLISHED]] + scored[POLISHED:]
-    candidates = wrong_parameters(misfit, present, without, effects) + _steadied(calibration, best, without)
+    own = sorted(wrong_parameters(misfit, present, without, effects), key=lambda c: -c.gain)
+    candidates = [_confirmed(misfit, c, without) for c in own[:POLISHED]] + own[POLISHED:]
+    # What was not confirmed may not rank before what was.
+    weakest = min((c.gain for c in candidates[:POLISHED]), default=0.0)
+    candidates = candidates[:POLISHED] + [replace(c, gain=min(c.gain, weakest)) for c in own[POLISHED:]]
+    candidates += _steadied(calibration, best, without)
     candidates += [
         Candidate(cause, place, found, without - minus_two_log_evidence(found), direction)
         for cause, place, direction, found in large_changes(misfit, present, effects)
@@ -214,21 +219,21 @@ def _refitted(
     ]
     for share in shares:
         led = [
-            _tried(misfit, theta, causes, kalman_gain(misfit, theta, share), iterations=3, tolerance=20)
+            tried(misfit, theta, causes, kalman_gain(misfit, theta, share), iterations=3, tolerance=20)
             for theta, causes, _ in running
         ]
-        running = [(f.theta, f.causes, f) for f in _leading([f for f in led if f is not None])]
+        running = [(f.theta, f.causes, f) for f in leading([f for f in led if f is not None])]
     first = [
-        (_tried(misfit, theta, causes, present.observer, iterations=2, tolerance=1), guided)
+        (tried(misfit, theta, causes, present.observer, iterations=2, tolerance=1), guided)
         for theta, causes, guided in running
     ]
     plain = {id(f): guided for f, guided in first if f is not None}
-    kept = _leading([f for f, _ in first if f is not None])
-    found = [(_tried(misfit, f.theta, f.causes, present.observer, iterations=6), plain[id(f)]) for f in kept]
+    kept = leading([f for f, _ in first if f is not None])
+    found = [(tried(misfit, f.theta, f.causes, present.observer, iterations=6), plain[id(f)]) for f in kept]
     return [(f, guided) for f, guided in found if f is not None]
 
 
-def _tried(
+def tried(
     misfit: Misfit,
     theta: Array,
     causes: Sequence[Hypothesis],
@@ -246,11 +251,20 @@ def _tried(
     return found if finite else None
 
 
-def _leading(fits: Sequence[Fit]) -> list[Fit]:
+def leading(fits: Sequence[Fit]) -> list[Fit]:
     """The best fits, the price of their variables paid."""
     price = {id(f): f.objective + sum(max(c.n, 1) for c in f.causes) * np.log(f.residual.size) for f in fits}
     ordered = sorted(fits, key=lambda f: price[id(f)])
     return [f for i, f in enumerate(ordered) if i < KEPT or price[id(f)] < price[id(ordered[0])] + CLOSE]
+
+
+def _confirmed(misfit: Misfit, candidate: Candidate, without: float) -> Candidate:
+    """The candidate, a change of the model's own, fitted with its prior lifted: what a quadratic promises may not come true."""
+    assert candidate.direction is not None
+    changed = replace(misfit, parameters=misfit.parameters.lifted(candidate.direction))
+    found = candidate.fit
+    refit = fit(changed, found.theta, found.causes, observer=found.observer, iterations=10, tolerance=0.1)
+    return replace(candidate, fit=refit, gain=without - minus_two_log_evidence(refit))
 
 
 def _polished(misfit: Misfit, candidate: Candidate, without: float) -> Candidate:

@@ -162,6 +162,11 @@ class AtOutput:
         self.require(self.location, _names(rig.outputs), "output channel")
         return _with_stage(rig, "sensors", stage)
 
+    def with_samples_through(self: Any, rig: Rig, stage: Stage) -> Rig:
+        """The rig with one more stage that the samples of the channel pass first."""
+        self.require(self.location, _names(rig.outputs), "output channel")
+        return rig.with_chain(replace(rig.chain, acquisition=(stage, *rig.chain.acquisition)))
+
     @classmethod
     def places(cls, rig: Rig) -> tuple[str, ...]:
         """Every connected output channel."""

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import ClassVar
 
 from lab.chain import BandLimitedLag, Lag
@@ -32,9 +32,7 @@ class SensorLag(AtOutput, Effect):
         self.require_positive("corner_hz")
         if not self.band_limited:
             return self.with_stage(rig, Lag(self.location, self.corner_hz))
-        self.require(self.location, [channel.name for channel in rig.outputs], "output channel")
-        stage, chain = BandLimitedLag(self.location, self.corner_hz), rig.chain
-        return rig.with_chain(replace(chain, acquisition=(stage, *chain.acquisition)))
+        return self.with_samples_through(rig, BandLimitedLag(self.location, self.corner_hz))
 
     def explain(self, plant: Plant, survey: Survey) -> Plant:
         i = survey.output(self.location)

@@ -153,8 +153,8 @@ def _held_lag(time_constant: float) -> Callable[[Array], Array]:
     return change
 
 
-def _band_limited_lag(corner_hz: float) -> Callable[[Array], Array]:
-    """Every tone of the signal and as much silence divided by 1 + i f / f_c, tone by tone."""
+def _every_tone(response: Callable[[float], complex]) -> Callable[[Array], Array]:
+    """Every tone of the signal and as much silence times a response at its frequency, tone by tone."""
 
     def change(y: Array) -> Array:
         n, t = y.size, np.arange(y.size)
@@ -162,7 +162,7 @@ def _band_limited_lag(corner_hz: float) -> Callable[[Array], Array]:
         for k in range(n + 1):
             tone = np.exp(1j * pi * k * t / n)
             size = np.vdot(tone, y) / n / (2 if k in (0, n) else 1)
-            w += (size * tone / (1 + 1j * k / (2 * n * DT) / corner_hz)).real
+            w += (size * response(k / (2 * n * DT)) * tone).real
         return w
 
     return change
@@ -299,7 +299,12 @@ CASES: dict[str, Case] = {
     "sensor lag": Case(EFFECTS["sensor_lag"]("acc0.x", corner_hz=4.0), _lagging_output(0, 4.0), order=None),
     "sensor lag, band-limited": Case(
         EFFECTS["sensor_lag"]("acc0.x", corner_hz=4.0, band_limited=True),
-        _with_output(0, _band_limited_lag(4.0)),
+        _with_output(0, _every_tone(lambda f: 1 / (1 + 1j * f / 4.0))),
+        order=None,
+    ),
+    "sensor delay, band-limited": Case(
+        EFFECTS["sensor_delay"]("acc0.x", delay=0.6 * DT, band_limited=True),
+        _with_output(0, _every_tone(lambda f: np.exp(-2j * pi * f * 0.6 * DT))),
         order=None,
     ),
     "sensor saturation": Case(
