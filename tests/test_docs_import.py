@@ -13,13 +13,10 @@ from lab.files.document import read_document
 from lab.files.exporting_points import load_points
 from lab.files.recipe import parse_recipe
 from tests.lab import universal
+from tests.tutorial import blocks
 
 ROOT = Path(__file__).parent.parent
 PAGE = (ROOT / "docs" / "import.md").read_text("utf-8")
-
-
-def blocks(language):
-    return re.findall(rf"```{language}\n(.*?)```", PAGE, re.DOTALL)
 
 
 @pytest.fixture
@@ -36,14 +33,16 @@ def truth(tmp_path, monkeypatch):
         for node, reading in zip((2, 3), record.outputs / 9.80665, strict=True):
             sets.append(universal.function(reading, t, node=node, direction=1, label="g", binary=">"))
     (tmp_path / "my_test.uff").write_bytes(b"".join(sets))
-    (tmp_path / "my_recipe.toml").write_text(next(block for block in blocks("toml") if "force 1+X" in block))
+    (tmp_path / "my_recipe.toml").write_text(
+        next(block for block in blocks(PAGE, "toml") if "force 1+X" in block)
+    )
     monkeypatch.chdir(tmp_path)
     return rig.modes()
 
 
 @pytest.mark.slow
 def test_the_commands_run_and_find_the_modes(truth, capsys):
-    commands = [line for block in blocks("sh") for line in block.splitlines()]
+    commands = [line for block in blocks(PAGE, "sh") for line in block.splitlines()]
     assert len(commands) == 7
     for command in commands:
         typed, _, remark = command.partition("#")
@@ -69,7 +68,7 @@ def test_the_commands_run_and_find_the_modes(truth, capsys):
 
 
 def test_the_recipes_are_sound(tmp_path):
-    tables = blocks("toml")
+    tables = blocks(PAGE, "toml")
     assert len(tables) == 4
     for table in tables:
         if "[channels]" in table:

@@ -5,23 +5,11 @@ from pathlib import Path
 
 import pytest
 
-from lab.cli import main
 from lab.files.placement import load_placement
+from tests.tutorial import blocks, run
 
 ROOT = Path(__file__).parent.parent
 TEXT = (ROOT / "docs/placement.md").read_text("utf-8")
-
-
-def blocks(language):
-    return re.findall(rf"```{language}\n(.*?)```", TEXT, re.DOTALL)
-
-
-def run(command):
-    program, *words = command.split()
-    assert program == "lab"
-    with pytest.raises(SystemExit) as ended:
-        main(words)
-    assert ended.value.code == 0, command
 
 
 @pytest.mark.slow
@@ -29,7 +17,7 @@ def test_the_commands_come_to_what_the_text_says(tmp_path, monkeypatch, capsys):
     for name in ("scenarios", "models"):
         (tmp_path / name).symlink_to(ROOT / name)
     monkeypatch.chdir(tmp_path)
-    commands = [line for block in blocks("sh") for line in block.splitlines()]
+    commands = [line for block in blocks(TEXT, "sh") for line in block.splitlines()]
     view = [command for command in commands if command.startswith("lab view")]
     assert view == ["lab view out/matrices"]  # opens a window, so it is not run here
     for command in commands:
@@ -63,7 +51,7 @@ def test_the_commands_come_to_what_the_text_says(tmp_path, monkeypatch, capsys):
     assert any("times 0.1" in drive["excitation"] for drive in diagnosis["drives"])
 
     capsys.readouterr()
-    (code,) = blocks("python")
+    (code,) = blocks(TEXT, "python")
     exec(code, {})
     said = capsys.readouterr().out
     assert "best 1 " in said

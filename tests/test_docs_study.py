@@ -8,15 +8,11 @@ from pathlib import Path
 import pytest
 
 from lab import catalogue
-from lab.cli import main
 from lab.studies.plan import load_study
+from tests.tutorial import blocks, run
 
 ROOT = Path(__file__).parent.parent
 TEXT = (ROOT / "docs/study.md").read_text("utf-8")
-
-
-def blocks(language):
-    return re.findall(rf"```{language}\n(.*?)```", TEXT, re.DOTALL)
 
 
 @pytest.mark.slow
@@ -29,22 +25,18 @@ def test_the_commands_run_and_write_what_the_text_says(tmp_path, monkeypatch, ca
         text.replace("repeats = 20", "repeats = 1").replace("count = 5", "count = 2"), encoding="utf-8"
     )
     monkeypatch.chdir(tmp_path)
-    (command,) = [line for block in blocks("sh") for line in block.splitlines()]
-    program, *words = command.split()
-    assert program == "lab"
-    with pytest.raises(SystemExit) as ended:
-        main(words)
-    assert ended.value.code == 0
+    (command,) = [line for block in blocks(TEXT, "sh") for line in block.splitlines()]
+    run(command)
     assert "4 runs: 4 points, 1 repeat\n" in capsys.readouterr().out
     for name in re.findall(r"^- `(\w+\.\w+)`", TEXT, re.MULTILINE):
         assert (tmp_path / "out/noise" / name).is_file()
-    (code,) = blocks("python")
+    (code,) = blocks(TEXT, "python")
     exec(code, {"__name__": "__main__"})
     assert "{'instruments.noise_percent': 0.5, 'identification.method': 'era'} " in capsys.readouterr().out
 
 
 def test_the_study_file_shown_is_a_study(tmp_path):
-    (text,) = blocks("toml")
+    (text,) = blocks(TEXT, "toml")
     path = tmp_path / "study.toml"
     path.write_text(text, encoding="utf-8")
     assert load_study(path).n_runs == 7 * 2 * tomllib.loads(text)["repeats"]
