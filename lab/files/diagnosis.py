@@ -69,10 +69,7 @@ def load_diagnosis(path: str | Path) -> dict[str, Any]:
     Raises:
         FileError: no such file, not JSON, of another format or version, or incomplete.
     """
-    document = read_document(path, form=FORMAT, version=VERSION)
-    missing = [key for key in KEYS if key not in document]
-    if missing:
-        raise FileError(f"{path}: has no {missing[0]!r}; expected {', '.join(KEYS)}")
+    document = read_document(path, form=FORMAT, version=VERSION, keys=KEYS)
     if document["verdict"] not in VERDICTS:
         raise FileError(f"{path}: verdict is {document['verdict']!r}; expected one of {', '.join(VERDICTS)}")
     return document

@@ -6,7 +6,7 @@ import json
 import math
 import os
 import uuid
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -47,11 +47,11 @@ def write_document(document: Mapping[str, Any], path: str | Path) -> None:
         ) from None
 
 
-def read_document(path: str | Path, *, form: str, version: int) -> dict[str, Any]:
-    """The document in a JSON file of that format and version.
+def read_document(path: str | Path, *, form: str, version: int, keys: Sequence[str] = ()) -> dict[str, Any]:
+    """The document in a JSON file of that format and version, with at least these keys.
 
     Raises:
-        FileError: no such file, not JSON, or of another format or version.
+        FileError: no such file, not JSON, of another format or version, or incomplete.
     """
     path = Path(path)
     try:
@@ -67,4 +67,7 @@ def read_document(path: str | Path, *, form: str, version: int) -> dict[str, Any
         raise FileError(
             f"{path}: is of format {given[0]!r} version {given[1]!r}; expected {form!r} version {version}"
         )
+    missing = [key for key in keys if key not in document]
+    if missing:
+        raise FileError(f"{path}: has no {missing[0]!r}; expected {', '.join(keys)}")
     return dict(document)

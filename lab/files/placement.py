@@ -6,7 +6,6 @@ from dataclasses import asdict, fields
 from pathlib import Path
 from typing import Any
 
-from lab.errors import FileError
 from lab.files.document import plain, read_document, write_document
 from lab.placement.outcome import Placement
 
@@ -43,8 +42,4 @@ def load_placement(path: str | Path) -> dict[str, Any]:
     Raises:
         FileError: no such file, not JSON, of another format or version, or incomplete.
     """
-    document = read_document(path, form=FORMAT, version=VERSION)
-    missing = [key for key in KEYS if key not in document]
-    if missing:
-        raise FileError(f"{path}: has no {missing[0]!r}; expected {', '.join(KEYS)}")
-    return document
+    return read_document(path, form=FORMAT, version=VERSION, keys=KEYS)
