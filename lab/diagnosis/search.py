@@ -190,10 +190,10 @@ def search(
     scored = sorted((_candidate(f, g, without) for f, g in refits), key=lambda c: -c.gain)
     best = [_polished(misfit, c, without) for c in scored[:POLISHED]] + scored[POLISHED:]
     own = sorted(wrong_parameters(misfit, present, without, effects), key=lambda c: -c.gain)
-    candidates = [_confirmed(misfit, c, without) for c in own[:POLISHED]] + own[POLISHED:]
+    candidates = [_confirmed(misfit, c, without) for c in own[:POLISHED]]
     # What was not confirmed may not rank before what was.
-    weakest = min((c.gain for c in candidates[:POLISHED]), default=0.0)
-    candidates = candidates[:POLISHED] + [replace(c, gain=min(c.gain, weakest)) for c in own[POLISHED:]]
+    weakest = min((c.gain for c in candidates), default=0.0)
+    candidates += [replace(c, gain=min(c.gain, weakest)) for c in own[POLISHED:]]
     candidates += _steadied(calibration, best, without)
     candidates += [
         Candidate(cause, place, found, without - minus_two_log_evidence(found), direction)
