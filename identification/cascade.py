@@ -13,7 +13,7 @@ import numpy as np
 import scipy.linalg
 from numpy.typing import NDArray
 
-from identification.modal_responses import Run, recursion
+from identification.modal_signals import Run, recursion
 from identification.parameterizations import Tangent
 from identification.recording import Array
 from identification.systems import StateSpace

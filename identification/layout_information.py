@@ -13,8 +13,9 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from identification import modal_responses
 from identification.errors import IdentificationError
+from identification.modal_responses import derivative_weights, output_weights
+from identification.modal_signals import close_pairs, signals, spectrum
 from identification.output_error import OutputError, output_error
 from identification.parameterizations import Parameterization
 from identification.recording import Array, Recording, frozen
@@ -119,20 +120,20 @@ def layout_information(
 
 def _sensitivities(problem: OutputError, theta: Array) -> tuple[_Sensitivities, ...]:
     tangent = problem.tangent(theta)
-    system, modes = tangent.system, modal_responses.spectrum(tangent.system)
+    system, modes = tangent.system, spectrum(tangent.system)
     if modes is None:
         raise IdentificationError(
             "a pole of the model is critically damped, so that its modes do not tell its responses; change a damping slightly"
         )
     found = []
     for run in problem.runs:
-        pairs = modal_responses.close_pairs(modes, system.dt, run)
+        pairs = close_pairs(modes, system.dt, run)
         products: Array = np.zeros(())
-        for _, X in modal_responses._signals(system, modes, run, False, pairs):
+        for _, X in signals(system, modes, run, False, pairs):
             products = products + X @ X.T
-        outputs = modal_responses._prediction(system, modes, run, None)
+        outputs = output_weights(system, modes, run, None)
         outputs = np.pad(outputs, ((0, 0), (0, len(products) - outputs.shape[1])))
-        derivatives = np.stack([*modal_responses._coefficients(tangent, modes, run, None, pairs)])
+        derivatives = np.stack([*derivative_weights(tangent, modes, run, None, pairs)])
         # Each kind of signal has one row per active input, inputs running fastest.
         source = np.tile(run.active, len(products) // max(len(run.active), 1))
         found.append(_Sensitivities(products, source, outputs, derivatives, run.outputs.shape[1]))

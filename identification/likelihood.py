@@ -15,7 +15,7 @@ from identification.error_bars import covariance_of, delta_method, spread
 from identification.errors import TooShortError
 from identification.families import Model, family
 from identification.modal_parameters import ModalParameters
-from identification.modal_responses import Run
+from identification.modal_signals import Run
 from identification.modes import Modes
 from identification.output_error import OutputError, output_error, simulated
 from identification.parameterizations import Parameterization

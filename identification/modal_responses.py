@@ -10,106 +10,14 @@ the products of these signals.
 from __future__ import annotations
 
 from collections.abc import Iterator
-from typing import NamedTuple
 
 import numpy as np
-import scipy.linalg
 from numpy.typing import NDArray
 
+from identification.modal_signals import Complex, Pairs, Run, Spectrum, close_pairs, signals
 from identification.parameterizations import Tangent
 from identification.recording import Array
 from identification.systems import StateSpace
-from identification.zero_order_hold import divided_hold, hold
-
-Complex = NDArray[np.complex128]
-BLOCK = 1 << 14
-ILL_CONDITIONED = 1e4
-
-
-class Run(NamedTuple):
-    """One record as the likelihood sees it.
-
-    Attributes:
-        inputs: those that act at all, shape (n_active, n_samples).
-        active: their positions among the input channels.
-        outputs: shape (n_outputs, n_samples), zero where missing.
-        dt: sample time [s].
-        missing: which samples of the outputs are, shape (n_outputs, n_samples); None where none is.
-    """
-
-    inputs: Array
-    active: NDArray[np.intp]
-    outputs: Array
-    dt: float
-    missing: NDArray[np.bool_] | None = None
-
-    def errors(self, predicted: Array, where: slice = slice(None)) -> Array:
-        """Measured minus predicted outputs over a stretch, zero where nothing was measured."""
-        e = self.outputs[:, where] - predicted
-        if self.missing is not None:
-            e[self.missing[:, where]] = 0
-        return np.asarray(e)
-
-
-class Spectrum(NamedTuple):
-    """Poles and eigenvectors of A.
-
-    Attributes:
-        poles: all of them, as A has them: sampled or continuous, shape (n_states,).
-        phi: eigenvectors Φ, shape (n_states, n_states).
-        phi_inv: Φ⁻¹.
-        own: positions of the poles that stand for themselves and their conjugates.
-        partner: position of the conjugate of each pole, shape (n_states,).
-        twice: 2 for the poles that do, 1 for real ones, shape (n_own,).
-    """
-
-    poles: Complex
-    phi: Complex
-    phi_inv: Complex
-    own: NDArray[np.intp]
-    partner: NDArray[np.intp]
-    twice: Array
-
-
-class Pairs(NamedTuple):
-    """Poles so close that their responses cannot be told apart, each with itself included; one of conjugates.
-
-    Attributes:
-        near: whether two poles are close, shape (n_states, n_states).
-        a: positions of the first ones, shape (n_pairs,).
-        b: positions of the second ones.
-        twice: 2 for pairs that stand for their conjugates too, 1 for others.
-    """
-
-    near: NDArray[np.bool_]
-    a: NDArray[np.intp]
-    b: NDArray[np.intp]
-    twice: Array
-
-
-def spectrum(system: StateSpace) -> Spectrum | None:
-    """Poles and eigenvectors; None where A has too few eigenvectors to work with, as at a critical damping.
-
-    Args:
-        system: sampled or continuous.
-
-    Returns:
-        Poles and eigenvectors, or None.
-    """
-    # In balanced coordinates the units of the states have no say in the condition number.
-    balanced, (scale, _) = scipy.linalg.matrix_balance(system.A, permute=False, separate=True)
-    poles, phi = scipy.linalg.eig(balanced)
-    if system.n_states and np.linalg.cond(phi) > ILL_CONDITIONED:
-        return None
-    phi = scale[:, None] * phi
-    own = np.flatnonzero(poles.imag >= 0)
-    # Of a real matrix, conjugates come side by side, the one with positive imaginary part first.
-    partner = np.arange(poles.size)
-    up = np.flatnonzero(poles.imag > 0)
-    partner[up], partner[up + 1] = up + 1, up
-    twice = np.where(poles[own].imag > 0, 2.0, 1.0)
-    phi_inv = np.linalg.inv(phi).astype(complex)
-    return Spectrum(poles.astype(complex), phi.astype(complex), phi_inv, own, partner, twice)
 
 
 def simulate(system: StateSpace, modes: Spectrum, run: Run, initial: Array | None) -> Array:
@@ -124,8 +32,8 @@ def simulate(system: StateSpace, modes: Spectrum, run: Run, initial: Array | Non
     Returns:
         Shape (n_outputs, n_samples).
     """
-    weights = _prediction(system, modes, run, initial)
-    blocks = [weights @ X for _, X in _signals(system, modes, run, initial is not None, None)]
+    weights = output_weights(system, modes, run, initial)
+    blocks = [weights @ X for _, X in signals(system, modes, run, initial is not None, None)]
     return np.concatenate(blocks, axis=1)
 
 
@@ -147,19 +55,19 @@ def normal_equations(
     Source: Kay (1993), Fundamentals of Statistical Signal Processing I, eq. (3.31), for a covariance that does
         not depend on the parameters.
     """
-    predict = _prediction(tangent.system, modes, run, initial)
+    predict = output_weights(tangent.system, modes, run, initial)
     pairs = close_pairs(modes, tangent.system.dt, run)
     G: Array = np.zeros(())  # products of the signals among themselves, (n_signals, n_signals)
     V: Array = np.zeros(())  # and with the residuals, (n_signals, n_outputs)
     unseen: Array | None = None  # what G would be over the samples missing, (n_outputs, n_signals, n_signals)
-    for where, X in _signals(tangent.system, modes, run, initial is not None, pairs):
+    for where, X in signals(tangent.system, modes, run, initial is not None, pairs):
         G = G + X @ X.T
         V = V + X @ run.errors(predict @ X[: predict.shape[1]], where).T
         if run.missing is not None:
             unseen = _squares_at(X, run.missing[:, where], unseen)
     n = tangent.n_parameters + (0 if initial is None else tangent.system.n_states)
     gradient, information = np.zeros(n), np.zeros((n, n))
-    for o, T in enumerate(_coefficients(tangent, modes, run, initial, pairs)):
+    for o, T in enumerate(derivative_weights(tangent, modes, run, initial, pairs)):
         # The shape at one output does not move the others.
         rows = np.flatnonzero(np.any(T, axis=1))
         gradient[rows] += weights[o] * (T[rows] @ V[:, o])
@@ -174,88 +82,18 @@ def _squares_at(X: Array, missing: NDArray[np.bool_], before: Array | None) -> A
     return products if before is None else before + products
 
 
-def close_pairs(modes: Spectrum, system_dt: float, run: Run) -> Pairs:
-    """Pairs of poles that drift apart by less than a hundredth while their responses last.
-
-    Others may be divided by their difference: squared, as in the information, that costs four digits.
+def output_weights(system: StateSpace, modes: Spectrum, run: Run, initial: Array | None) -> Array:
+    """What each Re r, Im r and input counts in each output, shape (n_outputs, n_signals without d).
 
     Args:
-        modes: poles of the model.
-        system_dt: its sample time [s]; 0 for a continuous one.
-        run: the record, for its length.
+        system: the model.
+        modes: its spectrum.
+        run: the record, for its active inputs.
+        initial: state at the first sample; rest when None.
 
     Returns:
-        The pairs.
+        Coefficients of the first of the `signals`.
     """
-    poles = modes.poles
-    size = np.maximum(np.abs(poles), np.finfo(float).tiny)
-    rate = np.minimum(np.abs(np.log(size)), 1) if system_dt else np.abs(poles.real)
-    lasting = run.outputs.shape[1] * (1.0 if system_dt else run.dt)
-    near = np.abs(poles[:, None] - poles) < 1e-2 * (rate + 1 / lasting)
-    near |= near.T
-    a, b, twice = [], [], []
-    for i, j in zip(*np.nonzero(np.triu(near)), strict=True):
-        conjugate = sorted((modes.partner[i], modes.partner[j]))
-        if [i, j] <= conjugate:
-            a.append(i)
-            b.append(j)
-            twice.append(1.0 if [i, j] == conjugate else 2.0)
-    return Pairs(near, np.array(a, dtype=np.intp), np.array(b, dtype=np.intp), np.array(twice))
-
-
-def _signals(
-    system: StateSpace, modes: Spectrum, run: Run, released: bool, pairs: Pairs | None
-) -> Iterator[tuple[slice, Array]]:
-    """Blocks of Re r and Im r of each own pole and source, the inputs themselves, then Re d and Im d of each pair.
-
-    Sources are the active inputs and, when `released`, the initial state.
-    """
-    n_inputs, n_samples = run.inputs.shape
-    z, h = hold(modes.poles, system.dt, run.dt)
-    r_next = np.zeros((len(z), n_inputs + released), dtype=complex)
-    r_next[:, n_inputs:] = 1
-    first, second = (pairs.a, pairs.b) if pairs else (np.zeros(0, dtype=np.intp),) * 2
-    dz, dh = divided_hold(modes.poles[first], modes.poles[second], system.dt, run.dt)
-    d_next = np.zeros((len(first), n_inputs + released), dtype=complex)
-    for start in range(0, n_samples, BLOCK):
-        where = slice(start, min(start + BLOCK, n_samples))
-        u = run.inputs[:, where]
-        forcing = np.concatenate([u, np.zeros((int(released), u.shape[1]))])
-        r = np.empty((len(z), *forcing.shape), dtype=complex)
-        for i in modes.own:
-            r[i], r_next[i] = recursion(z[i], h[i] * forcing, r_next[i])
-        r[modes.partner[modes.own]] = r[modes.own].conj()
-        d = np.empty((len(first), *forcing.shape), dtype=complex)
-        for k, (a, b) in enumerate(zip(first, second, strict=True)):
-            # r_a - r_b obeys the recursion of r_a, driven by what sets the two apart.
-            d[k], d_next[k] = recursion(z[a], dz[k] * r[b] + dh[k] * forcing, d_next[k])
-        own = r[modes.own]
-        yield where, np.concatenate([_rows(own.real), _rows(own.imag), u, _rows(d.real), _rows(d.imag)])
-
-
-def _rows(x: Array) -> Array:
-    return x.reshape(-1, x.shape[-1])
-
-
-def recursion(z: complex, forcing: Complex, start: Complex) -> tuple[Complex, Complex]:
-    """x⁺ = z x + forcing along the last axis from `start`, and the x after the last one.
-
-    Args:
-        z: sampled pole.
-        forcing: shape (…, n_samples).
-        start: x at the first sample, shape (…).
-
-    Returns:
-        x at all samples, shape (…, n_samples), and behind the last, shape (…).
-    """
-    from scipy.signal import lfilter  # slow to load, and only simulations need it
-
-    x, after = lfilter([0, 1], [1, -z], forcing, axis=-1, zi=start[..., None])
-    return x, after[..., 0]
-
-
-def _prediction(system: StateSpace, modes: Spectrum, run: Run, initial: Array | None) -> Array:
-    """What each Re r, Im r and input counts in each output, shape (n_outputs, n_signals without s)."""
     gamma, beta = _gamma(system, modes), _beta(system, modes, run, initial)[modes.own]
     c = gamma[:, :, None] * beta
     flat = [x.reshape(len(gamma), -1) for x in (c.real, -c.imag)]
@@ -273,10 +111,20 @@ def _beta(system: StateSpace, modes: Spectrum, run: Run, initial: Array | None) 
     return modes.phi_inv @ sources
 
 
-def _coefficients(
+def derivative_weights(
     tangent: Tangent, modes: Spectrum, run: Run, initial: Array | None, pairs: Pairs
 ) -> Iterator[Array]:
     """What each signal counts in the derivatives of each output, shape (n_parameters, n_signals).
+
+    Args:
+        tangent: the model and its derivatives.
+        modes: the spectrum of the model.
+        run: the record, for its active inputs.
+        initial: state at the first sample, which then counts as further parameters; rest when None.
+        pairs: of poles that are close.
+
+    Yields:
+        Coefficients of all `signals`, one output at a time.
 
     Source: first-order perturbation of eigenvalues and eigenvectors: γ (s - Λ)⁻¹ ∂A (s - Λ)⁻¹ β in partial
     fractions, but for close poles.

@@ -12,7 +12,7 @@ import numpy as np
 
 from identification import cascade, modal_responses
 from identification.errors import IdentificationError, RecordingError
-from identification.modal_responses import Run
+from identification.modal_signals import Run, spectrum
 from identification.parameterizations import Parameterization, Tangent
 from identification.recording import Array, Channel, Recording
 from identification.systems import StateSpace
@@ -108,7 +108,7 @@ class OutputError:
             weights: one over the noise variance of each record and output, shape (n_records, n_outputs).
         """
         tangent = self.tangent(q)
-        modes = modal_responses.spectrum(tangent.system)
+        modes = spectrum(tangent.system)
         gradient, information = np.zeros(self.n_unknowns), np.zeros((self.n_unknowns, self.n_unknowns))
         first = self.n_theta
         for run, initial, w in zip(self.runs, self.initial(q), weights, strict=True):
@@ -198,7 +198,7 @@ def simulated(system: StateSpace, runs: Sequence[Run], initial: Sequence[Array |
     Returns:
         One array per record.
     """
-    modes = modal_responses.spectrum(system)
+    modes = spectrum(system)
     if modes is None:
         return [cascade.simulate(system, run, x0) for run, x0 in zip(runs, initial, strict=True)]
     return [modal_responses.simulate(system, modes, run, x0) for run, x0 in zip(runs, initial, strict=True)]

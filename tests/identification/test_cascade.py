@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from identification import cascade
-from identification.modal_responses import Run, spectrum
+from identification.modal_signals import Run, spectrum
 from identification.parameterizations import Tangent
 from identification.systems import StateSpace
 from tests.identification.test_modal_responses import (

@@ -6,8 +6,8 @@ import scipy.linalg
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from identification import cascade, modal_responses
-from identification.modal_responses import Run, spectrum
+from identification import cascade, modal_responses, modal_signals
+from identification.modal_signals import Run, spectrum
 from identification.parameterizations import Tangent
 from identification.recording import Channel
 from identification.systems import StateSpace
@@ -202,7 +202,7 @@ def test_long_records_go_through_in_blocks(monkeypatch):
         )
 
     whole = results()
-    monkeypatch.setattr(modal_responses, "BLOCK", 7)
+    monkeypatch.setattr(modal_signals, "BLOCK", 7)
     monkeypatch.setattr(cascade, "BLOCK", 7)
     for a, b in zip(results(), whole, strict=True):
         assert_close(a, b, 1e-12)  # the same sums in another order
