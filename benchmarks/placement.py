@@ -19,6 +19,8 @@ from pathlib import Path
 
 # Matrices here are small: threads would cost more than they bring.
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
+# SDynPy loads Qt, which looks for a screen.
+os.environ.setdefault("QT_QPA_PLATFORM", "offscreen")
 sys.path.insert(0, str(Path(__file__).resolve().parent.parent))
 
 import numpy as np

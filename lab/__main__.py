@@ -2,4 +2,6 @@
 
 from lab.cli import main
 
-main()
+# Workers of a cluster import this module too, under another name.
+if __name__ == "__main__":
+    main()

@@ -1,7 +1,11 @@
 """A Dask cluster on this machine, and MPI where its executor is loaded: the same results as in one process."""
 
+import importlib.util
 import os
+import runpy
+import shutil
 import signal
+import subprocess
 import sys
 from concurrent.futures import ThreadPoolExecutor
 from types import ModuleType
@@ -65,3 +69,23 @@ def test_under_mpi_its_executor_does_the_work(monkeypatch):
     crew = mpi_crew()
     assert crew.size() == 7
     assert crew.submit(pow, 2, 3).result() == 8
+
+
+def test_a_worker_that_imports_the_command_does_not_run_it():
+    # Workers of mpi4py read the main module of their master under a name of their own.
+    assert runpy.run_module("lab.__main__", run_name="__worker__")["main"]
+
+
+@pytest.mark.slow
+@pytest.mark.skipif(
+    not (importlib.util.find_spec("mpi4py") and shutil.which("mpiexec")), reason="needs mpi4py and mpiexec"
+)
+def test_two_workers_under_mpi_give_the_same_bits(tmp_path):
+    path = written(tmp_path)
+    conducted(path, tmp_path / "alone")
+    typed = ["-m", "mpi4py.futures", "-m", "lab", "study", str(path), "--out", str(tmp_path / "mpi")]
+    done = subprocess.run(
+        ["mpiexec", "-n", "3", sys.executable, *typed], capture_output=True, text=True, timeout=120
+    )
+    assert done.returncode == 0, done.stderr
+    assert rows(tmp_path / "mpi") == rows(tmp_path / "alone")
