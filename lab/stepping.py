@@ -28,6 +28,8 @@ STATE = mujoco.mjtState.mjSTATE_FULLPHYSICS
 CONTROL = mujoco.mjtState.mjSTATE_CTRL | mujoco.mjtState.mjSTATE_QFRC_APPLIED
 CHUNK_BYTES = 32 << 20
 """Memory for the substeps that are under way at a time."""
+LOOSE = 1e-3
+"""Error from which on plain steps reach it with fewer substeps than three runs to extrapolate from must have."""
 
 
 @dataclass(frozen=True)
@@ -98,7 +100,7 @@ def first_guess(rig: Rig, dt: float, accuracy: float, duration: float) -> Plan:
     at_least = max(int(np.ceil(phase / 2)), 1)
     plain = max(at_least, int(np.ceil(phase * (0.15 / accuracy) ** (1 / 4))))
     cancelled = cancellable(rig, dt)
-    if not cancelled or (plain <= 16 and not rig.chain.needs_substeps):
+    if not cancelled or accuracy >= LOOSE or (plain <= 16 and not rig.chain.needs_substeps):
         return aligned(Plan(plain), dt, delays(rig))
     # The coarsest of the three runs must still be stable, and not out of phase by more than a tenth of a radian.
     turns = phase * min(duration, settling_time(rig)) / dt

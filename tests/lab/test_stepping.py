@@ -11,6 +11,7 @@ from hypothesis import strategies as st
 
 from lab import stepping
 from lab.errors import DivergedError
+from lab.instruments import instrument
 from lab.rig import Rig
 from lab.stepping import Plan, Stepper
 from tests.lab.structures import LINEAR, MODELS, chain_xml, held_response, model, moving, oscillator
@@ -140,6 +141,14 @@ def test_first_guess_is_stable_and_near(accuracy):
         # RK4 is stable up to ω h = 2.78 on the imaginary axis.
         assert phase < 2.7
         assert all(count >= 1 for count in plan.runs)
+
+
+def test_a_loose_accuracy_asks_for_no_more_runs_than_one():
+    rig = instrument(model("truss"), acquisition={"anti_alias": 0.3}, sample_rate=50.0)
+    loose, tight = (stepping.first_guess(rig, 0.02, accuracy, 60.0) for accuracy in (1e-2, 1e-6))
+    # Three runs to extrapolate from would have to be stable and in phase, which is finer than 1e-2 asks for.
+    assert loose.runs == (loose.substeps,)
+    assert loose.substeps < tight.substeps / 2
 
 
 @given(st.floats(1e-4, 0.3), st.integers(1, 60))
