@@ -2,13 +2,17 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 
 from identification.recording import Recording
 from lab import catalogue
+from lab.diagnosis.calibrate import WIDTHS, parameters_of
 from lab.diagnosis.diagnose import Progress, diagnose
 from lab.diagnosis.outcome import Diagnosis
-from lab.errors import LabError, RigError
+from lab.effects import EFFECTS
+from lab.effects.effect import Effect
+from lab.errors import LabError, RigError, UnknownNameError
 from lab.files.diagnosis import save_diagnosis
 from lab.files.folder import output_folder
 from lab.files.recording import load
@@ -16,6 +20,7 @@ from lab.matching import Names, matched, read_mapping, renamed, same_channels
 from lab.replay import Replay
 from lab.rig import Rig
 from lab.simulate import Motion, motion
+from lab.twin import twin
 
 PERIODS_SHOWN = 20
 """Length of the motion kept for the viewer, in periods of the lowest mode."""
@@ -28,6 +33,8 @@ def diagnose_file(
     *,
     baseline: str | Path | None = None,
     mapping: str | Path | Names | None = None,
+    widths: Mapping[str, float] | None = None,
+    effects: Sequence[str] | None = None,
     force: bool = False,
     command: str = "",
     progress: Progress | None = None,
@@ -40,6 +47,8 @@ def diagnose_file(
         out: folder to come, with diagnosis.json, extended.xml, report.html and run.rrd.
         baseline: recording file of the same rig in its known state.
         mapping: file that renames channels of recording and baseline, or the names themselves (see `lab.matching`).
+        widths: prior standard deviations of the model's own numbers, as for `lab.diagnose`.
+        effects: names of the causes that may be named; all of the catalogue when None.
         force: replace an earlier output there.
         command: how the lab was called, for the report.
         progress: told what is being done.
@@ -48,6 +57,7 @@ def diagnose_file(
         The diagnosis, and the recording with its channels as the model names them.
 
     Raises:
+        UnknownNameError: a width or an effect is of nothing that exists.
         LabError, IdentificationError: the files do not fit together, or the folder cannot be written.
     """
     with output_folder(out, force=force) as folder:
@@ -55,7 +65,14 @@ def diagnose_file(
         recording = renamed(load(path), names)
         rig = matched(_rig(model), recording)
         known = None if baseline is None else same_channels(renamed(load(baseline), names), recording)
-        diagnosis = diagnose(recording, rig, baseline=known, progress=progress)
+        diagnosis = diagnose(
+            recording,
+            rig,
+            baseline=known,
+            widths=_widths(widths or {}, rig),
+            effects=_effects(effects),
+            progress=progress,
+        )
         if progress is not None:
             progress("writing the report")
         facts = _facts({"Recording": path, "Model": model, "Baseline": baseline, "Names": mapping})
@@ -96,6 +113,23 @@ def _rig(model: str | Path) -> Rig:
         return Rig.load(path)
     except RigError as error:
         raise RigError(f"{error} (in {path})") from None
+
+
+def _widths(given: Mapping[str, float], rig: Rig) -> Mapping[str, float]:
+    known = (*WIDTHS, *parameters_of(twin(rig)).names) if given else ()
+    for name in given:
+        if name not in known:
+            raise UnknownNameError(
+                f"a width is given for {name!r}, which is no parameter of the model; there are {', '.join(known)}"
+            )
+    return given
+
+
+def _effects(names: Sequence[str] | None) -> Mapping[str, type[Effect]]:
+    for name in names or ():
+        if name not in EFFECTS:
+            raise UnknownNameError(f"effect {name!r} does not exist; there are {', '.join(EFFECTS)}")
+    return EFFECTS if names is None else {name: EFFECTS[name] for name in names}
 
 
 def _facts(given: dict[str, str | Path | Names | None]) -> dict[str, str]:

@@ -13,6 +13,7 @@ from typing import NoReturn
 import click
 
 from lab.cli.check import command as check
+from lab.cli.colour import coloured, wanted
 from lab.cli.diagnose import command as diagnose
 from lab.cli.export import command as export
 from lab.cli.identify import command as identify
@@ -24,11 +25,20 @@ from lab.cli.shared import example
 from lab.cli.study import command as study
 from lab.cli.view import command as view
 
-COMMANDS = (listing, run, check, identify, diagnose, place, study, import_, export, view)
+COMMANDS = (run, view, import_, check, identify, diagnose, place, study, export, listing)
 """One file each."""
 
 
+class Ordered(click.Group):
+    """Commands in the order of a test, not of the alphabet."""
+
+    def list_commands(self, ctx: click.Context) -> list[str]:
+        """Names as they were added."""
+        return list(self.commands)
+
+
 @click.group(
+    cls=Ordered,
     invoke_without_command=True,
     context_settings={"help_option_names": ["-h", "--help"], "max_content_width": 100},
     epilog=example("lab run scenarios/chain3_pulse.toml --out out/chain3"),
@@ -37,6 +47,7 @@ COMMANDS = (listing, run, check, identify, diagnose, place, study, import_, expo
 @click.pass_context
 def cli(context: click.Context) -> None:
     """The virtual modal lab: simulate, measure, identify, compare, diagnose."""
+    context.color = wanted()
     if context.invoked_subcommand is None:
         click.echo(context.get_help())
 
@@ -78,7 +89,7 @@ def main(arguments: Sequence[str] | None = None) -> NoReturn:
 
 
 def _fail(message: str, status: int = 2) -> NoReturn:
-    click.echo(f"lab: {' '.join(message.split())}", err=True)
+    click.echo(coloured(f"lab: {' '.join(message.split())}"), err=True, color=wanted())
     sys.exit(status)
 
 

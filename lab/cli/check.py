@@ -6,21 +6,21 @@ from pathlib import Path
 
 import click
 
-from lab.cli.shared import Doing, example, print_json
+from lab.cli.colour import coloured
+from lab.cli.progress import Doing
+from lab.cli.shared import FILE, example, json_option, map_option, model_option, print_json
 
 
-@click.command("check", epilog=example("lab check my_test.h5 --model my_structure.xml"))
-@click.argument("recording", metavar="RECORDING.h5", type=click.Path(path_type=Path))
-@click.option("--quiet", is_flag=True, help="Print faults alone.")
-@click.option("--json", "as_json", is_flag=True, help="Print the remarks as JSON, and nothing else.")
-@click.option(
-    "--map",
-    "mapping",
-    metavar="FILE.toml",
-    type=click.Path(path_type=Path),
-    help='Renames channels: lines "name in the recording" = "name in the model".',
+@click.command(
+    "check",
+    short_help="What is wrong with a recording before any analysis.",
+    epilog=example("lab check my_test.h5 --model my_structure.xml"),
 )
-@click.option("--model", metavar="MODEL.xml", help="The structure in MJCF, to find channels out of place.")
+@click.argument("recording", metavar="RECORDING.h5", type=FILE)
+@model_option("The structure in MJCF, to find channels out of place.")
+@map_option
+@json_option
+@click.option("--quiet", is_flag=True, help="Print faults alone.")
 def command(recording: Path, model: str | None, mapping: Path | None, as_json: bool, quiet: bool) -> None:
     """What to know about a recording before any analysis: dead, clipped, swapped channels and the like."""
     from lab import catalogue
@@ -30,7 +30,7 @@ def command(recording: Path, model: str | None, mapping: Path | None, as_json: b
     from lab.matching import read_mapping, renamed
     from lab.rig import Rig
 
-    with Doing(quiet or as_json) as doing:
+    with Doing(quiet) as doing:
         doing("reading")
         data = load(recording)
         if mapping is not None:
@@ -47,4 +47,4 @@ def command(recording: Path, model: str | None, mapping: Path | None, as_json: b
     else:
         text = screen(data, remarks, model, faults_alone=quiet)
         if text:
-            click.echo(text)
+            click.echo(coloured(text))

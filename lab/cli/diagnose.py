@@ -7,53 +7,82 @@ from pathlib import Path
 
 import click
 
-from lab.cli.shared import Doing, example, output_options, print_outcome, typed
+from lab.cli.completion import names_of
+from lab.cli.progress import Doing
+from lab.cli.shared import (
+    FILE,
+    example,
+    map_option,
+    model_option,
+    name_of_recording,
+    named,
+    numbers,
+    output_options,
+    print_outcome,
+    typed,
+)
 
 
 @click.command(
-    "diagnose", epilog=example("lab diagnose my_test.h5 --model my_structure.xml --out out/my_test")
+    "diagnose",
+    short_help="What a model gets wrong in a recording, and why.",
+    epilog=example("lab diagnose my_test.h5 --model my_structure.xml --out out/my_test"),
 )
-@click.argument("recording", metavar="RECORDING.h5", type=click.Path(path_type=Path))
-@output_options
-@click.option(
-    "--map",
-    "mapping",
-    metavar="FILE.toml",
-    type=click.Path(path_type=Path),
-    help='Renames channels: lines "name in the recording" = "name in the model".',
-)
+@click.argument("recording", metavar="RECORDING.h5", type=FILE)
+@model_option("What the structure is believed to be, in MJCF.", required=True)
 @click.option(
     "--baseline",
     metavar="RECORDING.h5",
-    type=click.Path(path_type=Path),
+    type=FILE,
     help="Recording of the same structure in its known state, to calibrate the model first.",
 )
+@map_option
 @click.option(
-    "--model", metavar="MODEL.xml", required=True, help="What the structure is believed to be, in MJCF."
+    "--widths",
+    multiple=True,
+    metavar="NAME=SHARE,…",
+    help="How far the model's own numbers may be off, relative, one standard deviation: of a group, as damping=0.5, or of "
+    "one parameter, as 'stiffness spring2_3=0.1' [default: mass=0.005,stiffness=0.02,damping=0.25].",
 )
+@click.option(
+    "--effects",
+    multiple=True,
+    metavar="NAME,…",
+    help="Causes that may be named, of `lab list effects`; all of them if left out.",
+    shell_complete=names_of("effects"),
+)
+@output_options("out/NAME_diagnosis")
 def command(
     recording: Path,
     model: str,
     baseline: Path | None,
     mapping: Path | None,
+    widths: tuple[str, ...],
+    effects: tuple[str, ...],
     out: Path | None,
     force: bool,
     as_json: bool,
     quiet: bool,
 ) -> None:
-    """What a model gets wrong in a recording, why, the extended model, and the gain."""
+    """What a model gets wrong in a recording, why, the extended model, and the gain.
+
+    MODEL.xml is a file, or a name from `lab list models`.
+    """
     from lab.diagnose_files import diagnose_file
     from lab.diagnosis_summary import diagnosis_summary
     from lab.files.diagnosis import diagnosis_document
 
-    folder = out or Path("out") / f"{recording.resolve().parent.name}_{recording.stem}_diagnosis"
+    folder = out or Path("out") / f"{name_of_recording(recording)}_diagnosis"
     with Doing(quiet) as progress:
+        progress("reading")
         diagnosis, known = diagnose_file(
             recording,
             model,
             folder,
             baseline=baseline,
             mapping=mapping,
+            widths=numbers("--widths", widths, "NAME=SHARE", "damping=0.5"),
+            effects=named(effects) or None,
             force=force,
             command=typed(),
             progress=progress,

@@ -6,29 +6,24 @@ from pathlib import Path
 
 import click
 
-from lab.cli.shared import example, print_json
+from lab.cli.colour import coloured
+from lab.cli.shared import FILE, example, force_option, json_option, model_option, print_json, quiet_option
 
 
 @click.command(
-    "export", epilog=example("lab export out/chain3 --to modes.uff --model models/chain3_uncoupled.xml")
+    "export",
+    short_help="Modes, signals or matrices for other programs.",
+    epilog=example("lab export out/chain3 --to modes.uff --model models/chain3_uncoupled.xml"),
 )
-@click.argument("source", metavar="FOLDER_OR_FILE", type=click.Path(path_type=Path))
-@click.option("--quiet", is_flag=True, help="Say nothing but errors.")
-@click.option("--json", "as_json", is_flag=True, help="Print what was written as JSON, and nothing else.")
-@click.option("--force", is_flag=True, help="Replace an earlier file.")
-@click.option("--text", is_flag=True, help="Signals in universal files as text, instead of binary numbers.")
+@click.argument("source", metavar="FOLDER_OR_FILE", type=FILE)
 @click.option(
-    "--points",
-    metavar="FILE.toml",
-    type=click.Path(path_type=Path),
-    help="Node, direction and position of every channel, for universal files.",
-)
-@click.option("--model", metavar="MODEL.xml", help="Where the channels are, told by the sensors of a model.")
-@click.option(
-    "--recording",
-    metavar="RECORDING.h5",
-    type=click.Path(path_type=Path),
-    help="Recording that a result comes from, which knows the units of its shapes.",
+    "--to",
+    "--out",
+    "to",
+    required=True,
+    metavar="FILE",
+    type=FILE,
+    help="File to write: .uff, .unv, .mat, .csv, or M.mtx, C.mtx, K.mtx.",
 )
 @click.option(
     "--what",
@@ -36,12 +31,22 @@ from lab.cli.shared import example, print_json
     help="What to export, where the source holds several; modes.uff and data.uff say it by their names.",
 )
 @click.option(
-    "--to",
-    required=True,
-    metavar="FILE",
-    type=click.Path(path_type=Path),
-    help="File to write: .uff, .unv, .mat, .csv, or M.mtx, C.mtx, K.mtx.",
+    "--recording",
+    metavar="RECORDING.h5",
+    type=FILE,
+    help="Recording that a result comes from, which knows the units of its shapes.",
 )
+@model_option("Where the channels are, told by the sensors of a model.")
+@click.option(
+    "--points",
+    metavar="FILE.toml",
+    type=FILE,
+    help="Node, direction and position of every channel, for universal files.",
+)
+@click.option("--text", is_flag=True, help="Signals in universal files as text, instead of binary numbers.")
+@force_option
+@json_option
+@quiet_option
 def command(
     source: Path,
     to: Path,
@@ -65,4 +70,4 @@ def command(
         print_json({"file": str(done.path), "what": done.what, "notes": list(done.notes)})
     elif not quiet:
         for line in (*(f"note: {note}" for note in done.notes), f"written: {done.path}"):
-            click.echo(line)
+            click.echo(coloured(line))

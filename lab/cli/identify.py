@@ -6,14 +6,16 @@ from pathlib import Path
 
 import click
 
-from lab.cli.shared import example, method_options, output_options, tell, typed
+from lab.cli.progress import Doing
+from lab.cli.shared import FILE, example, method_options, name_of_recording, output_options, tell, typed
 
 
 @click.command(
-    "identify", epilog=example("lab identify out/chain3/recording.h5 --method era --out out/again")
+    "identify",
+    short_help="Modes, and M, C, K, of any recording.",
+    epilog=example("lab identify out/chain3/recording.h5 --method era --out out/again"),
 )
-@click.argument("recording", metavar="RECORDING.h5", type=click.Path(path_type=Path))
-@output_options
+@click.argument("recording", metavar="RECORDING.h5", type=FILE)
 @method_options
 @click.option(
     "--refine",
@@ -21,6 +23,7 @@ from lab.cli.shared import example, method_options, output_options, tell, typed
     help="Move modes, and M, C, K where the set-up allows, to the maximum of the likelihood, with its error bars; "
     "needs measured forces, or free decays.",
 )
+@output_options("out/NAME_modes")
 def command(
     recording: Path,
     out: Path | None,
@@ -34,8 +37,10 @@ def command(
     """Modes, and M, C, K where the set-up allows, of any recording, real or virtual."""
     from lab.run import identify_file
 
-    folder = out or Path("out") / f"{recording.resolve().parent.name}_{recording.stem}"
-    result = identify_file(
-        recording, folder, method=method, order=order, refine=refine, force=force, command=typed()
-    )
+    folder = out or Path("out") / f"{name_of_recording(recording)}_modes"
+    with Doing(quiet) as doing:
+        doing("identifying")
+        result = identify_file(
+            recording, folder, method=method, order=order, refine=refine, force=force, command=typed()
+        )
     tell(result, folder, as_json, quiet)

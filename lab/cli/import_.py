@@ -7,37 +7,37 @@ from typing import Any
 
 import click
 
-from lab.cli.shared import example, print_json
+from lab.cli.colour import coloured
+from lab.cli.shared import FILE, example, force_option, json_option, print_json, quiet_option
 
 KINDS = ("pulse", "impact", "random", "burst_random", "sweep", "multisine", "ambient", "free_decay", "other")
 
 
-@click.command("import", epilog=example("lab import test.csv --recipe test.toml --out test.h5"))
-@click.argument("source", metavar="FILE_OR_FOLDER", type=click.Path(path_type=Path))
-@click.option("--quiet", is_flag=True, help="Say nothing but errors.")
-@click.option("--json", "as_json", is_flag=True, help="Print what was imported as JSON, and nothing else.")
-@click.option("--force", is_flag=True, help="Replace an earlier file.")
-@click.option(
-    "--out",
-    metavar="FILE",
-    type=click.Path(path_type=Path),
-    help="Recording file to write [default: NAME.h5].",
+@click.command(
+    "import",
+    short_help="A recording from UFF, MATLAB, CSV, text, NumPy or JSON.",
+    epilog=example("lab import my_test.uff --kind random --out my_test.h5"),
 )
-@click.option(
-    "--write-recipe",
-    metavar="FILE.toml",
-    type=click.Path(path_type=Path),
-    help="Where to put a recipe to start from, when one is needed, instead of printing it.",
-)
+@click.argument("source", metavar="FILE_OR_FOLDER", type=FILE)
 @click.option(
     "--kind", type=click.Choice(KINDS), help="What drove the structure, where nothing else says it."
 )
 @click.option(
     "--recipe",
     metavar="FILE.toml",
-    type=click.Path(path_type=Path),
+    type=FILE,
     help="What the columns mean: channels, units, rate, which samples to drop.",
 )
+@click.option(
+    "--write-recipe",
+    metavar="FILE.toml",
+    type=FILE,
+    help="Where to put a recipe to start from, when one is needed, instead of printing it.",
+)
+@click.option("--out", metavar="FILE", type=FILE, help="Recording file to write [default: NAME.h5].")
+@force_option
+@json_option
+@quiet_option
 def command(
     source: Path,
     recipe: Path | None,
@@ -87,7 +87,7 @@ def command(
         print_json(_document(imported, target, notes))
     elif not quiet:
         for line in (*_held(imported), *(f"note: {note}" for note in notes), f"written: {target}"):
-            click.echo(line)
+            click.echo(coloured(line))
 
 
 def _write(path: Path, text: str, force: bool) -> None:

@@ -4,12 +4,16 @@ from __future__ import annotations
 
 import click
 
-from lab.cli.shared import example, print_json
+from lab.cli.shared import example, json_option, print_json
 
 
-@click.command("list", epilog=example("lab list scenarios"))
+@click.command(
+    "list",
+    short_help="Models, scenarios, methods and effects that there are.",
+    epilog=example("lab list scenarios"),
+)
 @click.argument("kinds", type=click.Choice(["models", "scenarios", "methods", "effects"]), nargs=-1)
-@click.option("--json", "as_json", is_flag=True, help="Print the lists as JSON.")
+@json_option
 def command(kinds: tuple[str, ...], as_json: bool) -> None:
     """What there is: models, scenarios, methods, effects."""
     from lab import catalogue
@@ -20,7 +24,7 @@ def command(kinds: tuple[str, ...], as_json: bool) -> None:
         return
     for each, entries in listed.items():
         if len(listed) > 1:
-            click.echo(f"{each}:")
+            click.echo(click.style(f"{each}:", bold=True))
         width = max(map(len, entries), default=0)
         for name, text in entries.items():
             click.echo(f"  {name:<{width}}  {_shorten(text, 100 - width)}")

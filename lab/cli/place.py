@@ -8,43 +8,42 @@ from typing import Any
 
 import click
 
-from lab.cli.shared import Doing, example, output_options, print_outcome, typed
+from lab.cli.completion import names_of
+from lab.cli.progress import Doing
+from lab.cli.shared import (
+    example,
+    model_option,
+    named,
+    numbers,
+    output_options,
+    print_outcome,
+    seed_option,
+    typed,
+)
 
 
 @click.command(
     "place",
-    epilog=example(
-        "lab place --model models/truss.xml --sensors 5 --actuators 4 --target matrices --out out/place"
-    ),
+    short_help="Where sensors and actuators should go.",
+    epilog=example("lab place --model models/truss.xml --sensors 5 --actuators 4 --target matrices"),
 )
-@output_options
-@click.option("--seed", type=click.IntRange(min=0), help="Of the random forces of the planned test.")
+@model_option("The structure in MJCF, with all candidates in it.")
 @click.option(
-    "--cause", "causes", multiple=True, help="Cause to tell apart; the whole catalogue if left out."
+    "--sensors",
+    "n_sensors",
+    metavar="N",
+    type=click.IntRange(min=1),
+    required=True,
+    help="How many sensors.",
 )
-@click.option("--size", type=float, help="Size of the effects, as a share of the outputs [default: 0.01].")
 @click.option(
-    "--noise", multiple=True, metavar="UNIT=STD", help="Noise of sensors, as m/s^2=0.01; for each unit."
+    "--actuators",
+    "n_actuators",
+    metavar="N",
+    type=click.IntRange(min=0),
+    default=0,
+    help="How many actuators.",
 )
-@click.option("--noise-percent", type=float, help="Noise in percent of each output's RMS [default: 1].")
-@click.option("--duration", type=float, help="Of each record of the planned test [s].")
-@click.option("--sample-rate", type=float, help="Of the planned test [Hz].")
-@click.option("--level", type=float, help="Amplitude or RMS of the planned forces [N].")
-@click.option("--excitation", help="Planned signal, as random, sweep or pulse [default: random].")
-@click.option(
-    "--scenario", metavar="SCENARIO.toml", help="The test that is planned; its own layout is ranked too."
-)
-@click.option("--sensor-mass", type=float, help="Of each sensor [kg]: what it does to the frequencies.")
-@click.option("--references", type=click.IntRange(min=1), help="Sensors that stay in every set-up.")
-@click.option("--setups", type=click.IntRange(min=1), help="Set-ups between which the other sensors rove.")
-@click.option("--modes", "n_modes", type=click.IntRange(min=1), help="Lowest modes to tell apart.")
-@click.option("--criterion", help="d, a, e or, for modes, mac [default: d for modes, a for matrices].")
-@click.option("--triaxial", is_flag=True, help="The axes of a sensor are chosen together.")
-@click.option("--quantity", help="Of the sensors: acceleration, velocity or displacement.")
-@click.option(
-    "--forbid", multiple=True, metavar="NAME", help="Sensor or actuator left out; * and ? are wildcards."
-)
-@click.option("--fixed", multiple=True, metavar="NAME", help="Sensor or actuator that must be chosen.")
 @click.option(
     "--target",
     type=click.Choice(("modes", "matrices", "diagnosis")),
@@ -52,9 +51,68 @@ from lab.cli.shared import Doing, example, output_options, print_outcome, typed
     show_default=True,
     help="What the test is for.",
 )
-@click.option("--actuators", "n_actuators", type=click.IntRange(min=0), default=0, help="How many actuators.")
-@click.option("--sensors", "n_sensors", type=click.IntRange(min=1), required=True, help="How many sensors.")
-@click.option("--model", metavar="MODEL.xml", help="The structure in MJCF, with all candidates in it.")
+@click.option("--fixed", multiple=True, metavar="NAME", help="Sensor or actuator that must be chosen.")
+@click.option(
+    "--forbid", multiple=True, metavar="NAME", help="Sensor or actuator left out; * and ? are wildcards."
+)
+@click.option("--quantity", metavar="NAME", help="Of the sensors: acceleration, velocity or displacement.")
+@click.option("--triaxial", is_flag=True, help="The axes of a sensor are chosen together.")
+@click.option(
+    "--criterion", metavar="NAME", help="d, a, e or, for modes, mac [default: d for modes, a for matrices]."
+)
+@click.option(
+    "--modes", "n_modes", metavar="N", type=click.IntRange(min=1), help="Lowest modes to tell apart."
+)
+@click.option(
+    "--setups",
+    metavar="N",
+    type=click.IntRange(min=1),
+    help="Set-ups between which the other sensors rove.",
+)
+@click.option(
+    "--references", metavar="N", type=click.IntRange(min=1), help="Sensors that stay in every set-up."
+)
+@click.option(
+    "--sensor-mass",
+    metavar="KG",
+    type=float,
+    help="Of each sensor [kg]: what it does to the frequencies.",
+)
+@click.option(
+    "--scenario",
+    metavar="SCENARIO.toml",
+    help="The test that is planned; its own layout is ranked too.",
+    shell_complete=names_of("scenarios", files=True),
+)
+@click.option(
+    "--excitation", metavar="KIND", help="Planned signal, as random, sweep or pulse [default: random]."
+)
+@click.option("--level", metavar="FORCE", type=float, help="Amplitude or RMS of the planned forces [N].")
+@click.option("--sample-rate", metavar="HZ", type=float, help="Of the planned test [Hz].")
+@click.option("--duration", metavar="S", type=float, help="Of each record of the planned test [s].")
+@click.option(
+    "--noise-percent", metavar="P", type=float, help="Noise in percent of each output's RMS [default: 1]."
+)
+@click.option(
+    "--noise", multiple=True, metavar="UNIT=STD", help="Noise of sensors, as m/s^2=0.01; for each unit."
+)
+@click.option(
+    "--size",
+    metavar="SHARE",
+    type=float,
+    help="Size of the effects, as a share of the outputs [default: 0.01].",
+)
+@click.option(
+    "--effects",
+    "--cause",
+    "causes",
+    multiple=True,
+    metavar="NAME,…",
+    help="Causes to tell apart, of `lab list effects`; all of them if left out.",
+    shell_complete=names_of("effects"),
+)
+@seed_option("Seed of the random forces of the planned test.")
+@output_options("out/MODEL_placement")
 def command(
     model: str | None,
     n_sensors: int,
@@ -73,6 +131,7 @@ def command(
     from lab.place_files import place_file
     from lab.placement_summary import placement_summary
 
+    options["causes"] = named(options["causes"])
     test = {
         name: options.pop(name)
         for name in ("excitation", "level", "sample_rate", "duration", "noise_percent", "seed")
@@ -92,7 +151,7 @@ def command(
         name for name, value in options.items() if value not in (None, (), False) and name not in settings
     ]
     if foreign:
-        name = {"n_modes": "modes", "causes": "cause"}.get(foreign[0], foreign[0]).replace("_", "-")
+        name = {"n_modes": "modes", "causes": "effects"}.get(foreign[0], foreign[0]).replace("_", "-")
         raise click.UsageError(f"--{name} means nothing for the target {target}.")
     folder = out or Path("out") / f"{Path(model or scenario or 'model').stem}_placement"
     with Doing(quiet) as progress:
@@ -105,24 +164,10 @@ def command(
             target=target,
             scenario=scenario,
             test=test,
-            noise=_noise(noise),
+            noise=numbers("--noise", noise, "UNIT=STD", "m/s^2=0.01") or None,
             force=force,
             command=typed(),
             **settings,
         )
     document, text = partial(placement_document, placement), partial(placement_summary, placement)
     print_outcome(document, text, placement.warnings, folder, as_json, quiet)
-
-
-def _noise(given: tuple[str, ...]) -> dict[str, float] | None:
-    """Standard deviations by unit, from texts such as m/s^2=0.01."""
-    found = {}
-    for text in given:
-        unit, _, number = text.partition("=")
-        try:
-            found[unit] = float(number)
-        except ValueError:
-            raise click.UsageError(f"--noise is {text!r}; expected UNIT=STD, such as m/s^2=0.01.") from None
-        if not found[unit] > 0:
-            raise click.UsageError(f"--noise is {text!r}; expected a positive number.")
-    return found or None

@@ -6,16 +6,20 @@ from pathlib import Path
 
 import click
 
-from lab.cli.shared import Progress, example, method_options, output_options, tell, typed
+from lab.cli.completion import names_of
+from lab.cli.progress import Progress
+from lab.cli.shared import example, method_options, output_options, seed_option, tell, typed
 
 
-@click.command("run", epilog=example("lab run scenarios/chain3_pulse.toml --out out/chain3"))
-@click.argument("scenario", metavar="SCENARIO.toml")
-@output_options
-@click.option(
-    "--seed", type=click.IntRange(min=0), help="Seed of everything random, instead of the scenario's."
+@click.command(
+    "run",
+    short_help="A whole virtual test, from the structure to the report.",
+    epilog=example("lab run scenarios/chain3_pulse.toml --out out/chain3"),
 )
+@click.argument("scenario", metavar="SCENARIO.toml", shell_complete=names_of("scenarios", files=True))
+@seed_option("Seed of everything random, instead of the scenario's.")
 @method_options
+@output_options("out/SCENARIO")
 def command(
     scenario: str,
     out: Path | None,
@@ -35,6 +39,7 @@ def command(
 
     test = load_scenario(scenario).changed(seed=seed, method=method, order=order)
     folder = out or Path("out") / Path(scenario).stem
-    with Progress("simulating", quiet) as progress:
+    then = "identifying" if test.diagnosis is None else "identifying and diagnosing"
+    with Progress("simulating", quiet, then=then) as progress:
         result = run(test, folder, force=force, command=typed(), progress=progress)
     tell(result, folder, as_json, quiet)

@@ -2,22 +2,33 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 
 import click
 
-from lab.cli.shared import Progress, example, output_options, print_json, typed
+from lab.cli.colour import coloured
+from lab.cli.progress import Progress
+from lab.cli.shared import FILE, example, output_options, print_json, seed_option, typed
 
 
-@click.command("study", epilog=example("lab study scenarios/studies/noise.toml --out out/noise"))
-@click.argument("study_file", metavar="STUDY.toml", type=click.Path(path_type=Path))
-@output_options
+@click.command(
+    "study",
+    short_help="Many runs of a scenario: sweeps, Monte Carlo.",
+    epilog=example("lab study scenarios/studies/noise.toml --out out/noise"),
+)
+@click.argument("study_file", metavar="STUDY.toml", type=FILE)
+@click.option(
+    "--workers",
+    metavar="N",
+    type=click.IntRange(min=1),
+    help="Processes on this machine [default: one per core].",
+)
 @click.option(
     "--scheduler", metavar="ADDRESS", help="Scheduler of a Dask cluster, which does the work instead."
 )
-@click.option(
-    "--workers", type=click.IntRange(min=1), help="Processes on this machine [default: one per core]."
-)
+@seed_option("Seed of all runs, instead of the study's.")
+@output_options("out/STUDY")
 def command(
     study_file: Path,
     out: Path | None,
@@ -26,6 +37,7 @@ def command(
     quiet: bool,
     workers: int | None,
     scheduler: str | None,
+    seed: int | None,
 ) -> None:
     """Many runs of a scenario with something varied: sweeps, Monte Carlo.
 
@@ -34,12 +46,18 @@ def command(
     """
     from lab.studies.conduct import study
     from lab.studies.outcome import study_document
+    from lab.studies.plan import load_study
     from lab.studies.wording import study_summary
 
+    asked = load_study(study_file)
+    if seed is not None:
+        if any("seed" in axis.setting(0) for axis in asked.axes):
+            raise click.UsageError(f"--seed means nothing here: {study_file} varies 'seed' itself.")
+        asked = replace(asked, seed=seed)
     folder = out or Path("out") / study_file.stem
-    with Progress("running", quiet) as progress:
+    with Progress("running", quiet, then="collecting") as progress:
         outcome = study(
-            study_file,
+            asked,
             folder,
             workers=workers,
             scheduler=scheduler,
@@ -50,8 +68,8 @@ def command(
     if as_json:
         print_json(study_document(outcome))
     elif not quiet:
-        click.echo(study_summary(outcome))
+        click.echo(coloured(study_summary(outcome)))
         click.echo(f"\nwritten: {folder}, with study.h5 and report.html")
     else:
         for warning in outcome.warnings:
-            click.echo(f"warning: {warning}", err=True)
+            click.echo(coloured(f"warning: {warning}"), err=True)

@@ -3,18 +3,23 @@
 import json
 import os
 import re
+import shlex
 import subprocess
 import sys
 from pathlib import Path
 
+import click
 import h5py
 import numpy as np
 import pytest
 
 from identification.recording import Record
 from lab.cli import cli, main
+from lab.cli.colour import coloured
+from lab.cli.progress import CLEAR, Doing
 from lab.files.recording import load, save
 
+ROOT = Path(__file__).parents[2]
 SMALL = """
 title = "Two swings"
 model = "chain3_uncoupled.xml"
@@ -108,6 +113,8 @@ def test_a_terminal_sees_progress(bench, capsys, monkeypatch):
     printed = capsys.readouterr()
     assert "simulating" in printed.err
     assert "100%" in printed.err
+    assert "identifying …" in printed.err
+    assert printed.err.endswith(CLEAR)
     json.loads(printed.out)
 
 
@@ -307,11 +314,118 @@ def test_view_opens_the_viewer(finished, monkeypatch):
     assert called == [[sys.executable, "-m", "rerun", str(finished / "run.rrd")]]
 
 
-@pytest.mark.parametrize("name", sorted(cli.commands))
+def test_long_work_tells_for_how_long(capsys, monkeypatch):
+    monkeypatch.setattr("sys.stderr.isatty", lambda: True)
+    clock = iter((0.0, 0.0, 61.5))
+    monkeypatch.setattr("lab.cli.progress.time.monotonic", lambda: next(clock))
+    doing = Doing(quiet=False)
+    with doing as show:
+        monkeypatch.setattr(doing, "clock", object())  # no thread draws between
+        show("placing")
+        doing._draw()
+        doing.clock = None
+    assert capsys.readouterr().err == f"{CLEAR}placing …{CLEAR}placing … 1:01"
+    with Doing(quiet=True) as show:
+        show("placing")
+    assert capsys.readouterr().err == ""
+
+
+def test_colours_are_for_terminals_that_want_them(monkeypatch, bench):
+    """A command on a terminal of its own, as far as this system has such."""
+    pty = pytest.importorskip("pty")
+
+    def seen(**environment):
+        ours, theirs = pty.openpty()
+        subprocess.run(
+            [sys.executable, "-m", "lab", "fly"],
+            stderr=theirs,
+            env={**os.environ, **environment, "PYTHONPATH": str(ROOT)},
+            check=False,
+        )
+        os.close(theirs)
+        try:
+            return os.read(ours, 1000).decode()
+        finally:
+            os.close(ours)
+
+    monkeypatch.delenv("NO_COLOR", raising=False)
+    assert seen().startswith("\x1b[31m\x1b[1mlab:\x1b[0m No such command")
+    assert seen(NO_COLOR="1").startswith("lab: No such command")
+
+
+def test_colours_mark_the_beginning_of_lines():
+    painted = coloured("Explained: so\n  met    modes\n  MISSED mac\nnothing met  \nwarning: short")
+    assert (
+        click.unstyle(painted) == "Explained: so\n  met    modes\n  MISSED mac\nnothing met  \nwarning: short"
+    )
+    assert [line.startswith("\x1b") for line in painted.split("\n")] == [True, True, True, False, True]
+
+
+COMPLETED = (
+    ("lab dia", ["plain,diagnose"]),
+    ("lab run chain3_p", ["plain,chain3_pulse"]),
+    ("lab run ./sc", ["file,./sc"]),
+    ("lab diagnose test.h5 --effects freeplay,cubic", ["plain,freeplay,cubic_stiffness"]),
+    ("lab identify --method ssi_d", ["plain,ssi_data"]),
+    ("lab place --model trus", ["plain,truss", "plain,truss_spatial"]),
+    ("lab list eff", ["plain,effects"]),
+    ("lab study --se", ["plain,--seed"]),
+)
+
+
+@pytest.mark.parametrize(("words", "offered"), COMPLETED, ids=[words for words, _ in COMPLETED])
+def test_the_shell_completes(monkeypatch, capsys, words, offered):
+    monkeypatch.setenv("COMP_WORDS", words)
+    monkeypatch.setenv("COMP_CWORD", str(len(words.split()) - 1))
+    monkeypatch.setenv("_LAB_COMPLETE", "bash_complete")
+    assert status() == 0
+    assert capsys.readouterr().out.split() == offered
+
+
+@pytest.mark.parametrize("shell", ["bash", "zsh", "fish"])
+def test_the_script_for_completion(monkeypatch, capsys, shell):
+    # bash is asked for its version, which not every machine can tell.
+    monkeypatch.setattr("click.shell_completion.BashComplete._check_version", staticmethod(lambda: None))
+    monkeypatch.setenv("_LAB_COMPLETE", f"{shell}_source")
+    assert status() == 0
+    assert f"_LAB_COMPLETE={shell}_complete" in capsys.readouterr().out
+
+
+OPTIONS = {
+    "run": "--seed --method --order --out --force --json --quiet",
+    "view": "",
+    "import": "--out --force --json --quiet",
+    "check": "--model --map --json --quiet",
+    "identify": "--method --order --out --force --json --quiet",
+    "diagnose": "--model --map --effects --widths --out --force --json --quiet",
+    "place": "--model --effects --seed --out --force --json --quiet",
+    "study": "--seed --out --force --json --quiet",
+    "export": "--model --out --force --json --quiet",
+    "list": "--json",
+}
+"""The options that commands share."""
+
+
+@pytest.mark.parametrize("name", cli.commands)
+def test_shared_options_are_the_same_everywhere(name):
+    shared = {option for options in OPTIONS.values() for option in options.split()}
+    params = {
+        option: param for param in cli.commands[name].params for option in param.opts if option in shared
+    }
+    assert set(params) == set(OPTIONS[name].split())
+    for option, param in params.items():
+        assert param.is_flag == (option in ("--force", "--json", "--quiet")), option
+        assert param.help[-1] in ".]", option
+
+
+@pytest.mark.parametrize("name", cli.commands)
 def test_every_help_has_an_example(capsys, name):
     assert status(name, "--help") == 0
     printed = capsys.readouterr().out
-    assert f"Example: lab {name}" in " ".join(printed.split())
+    # On one line, so that it can be copied.
+    (line,) = re.findall(rf"^  Example: (lab {name} .*)$", printed, re.MULTILINE)
+    _, *words = shlex.split(line)
+    cli.commands[name].make_context(name, words[1:])
 
 
 def test_help_answers_at_once():

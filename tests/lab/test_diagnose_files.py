@@ -12,6 +12,7 @@ import pytest
 from identification.recording import Recording
 from lab.diagnose_files import diagnose_file
 from lab.diagnosis.outcome import Diagnosis
+from lab.effects import EFFECTS
 from lab.errors import LabError
 from lab.files.diagnosis import load_diagnosis
 from lab.files.recording import save
@@ -29,8 +30,11 @@ class StandIn:
     def __init__(self):
         self.asked = []
 
-    def __call__(self, recording: Recording, rig: Rig, *, baseline=None, progress=None) -> Diagnosis:
+    def __call__(
+        self, recording: Recording, rig: Rig, *, baseline=None, widths=None, effects=None, progress=None
+    ) -> Diagnosis:
         self.asked.append((recording, rig, baseline))
+        self.widths, self.effects = widths, effects
         if progress is not None:
             progress("searching for causes")
         return explained(rig, recording)
@@ -101,12 +105,40 @@ def test_json_is_the_file_and_nothing_else(engine, bench, capsys):
     assert printed.err == ""
 
 
+def test_widths_and_effects_reach_the_engine(engine, bench):
+    asked = ("--widths", "damping=0.5,mass=0.01", "--widths", "stiffness spring0_1=0.1", "--quiet")
+    few = ("--effects", "freeplay, cubic_stiffness", "--effects", "sensor_gain")
+    assert status(*ASKED, *asked, *few) == 0
+    assert engine.widths == {"damping": 0.5, "mass": 0.01, "stiffness spring0_1": 0.1}
+    assert engine.effects == {name: EFFECTS[name] for name in ("freeplay", "cubic_stiffness", "sensor_gain")}
+    assert status(*ASKED, "--quiet", "--force") == 0
+    assert (engine.widths, engine.effects) == ({}, EFFECTS)
+
+
+@pytest.mark.parametrize(
+    ("words", "says"),
+    [
+        (
+            ("--widths", "stiffness spring9=0.1"),
+            "'stiffness spring9', which is no parameter of the model; there",
+        ),
+        (("--widths", "damping"), "--widths is 'damping'; expected NAME=SHARE, such as damping=0.5."),
+        (("--widths", "damping=-1"), "expected a positive number"),
+        (("--widths", "damping=inf"), "expected a positive number"),
+        (("--effects", "rust"), "effect 'rust' does not exist; there are mass_change, "),
+    ],
+)
+def test_widths_and_effects_of_nothing_are_one_line(engine, bench, capsys, words, says):
+    assert says in complaint(capsys, *ASKED, *words)
+    assert sorted(os.listdir()) == ["model.xml", "test.h5"]
+
+
 def test_quiet_says_warnings_only(engine, bench, capsys):
     assert status(*ASKED, "--quiet") == 0
     printed = capsys.readouterr()
     assert printed.out == ""
     assert printed.err.startswith("warning: Too short")
-    assert sorted(os.listdir(f"out/{bench.name}_test_diagnosis")) == OUTPUTS
+    assert sorted(os.listdir("out/test_diagnosis")) == OUTPUTS
 
 
 def test_a_terminal_sees_what_is_being_done(engine, bench, capsys, monkeypatch):
