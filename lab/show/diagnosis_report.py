@@ -5,9 +5,9 @@ from __future__ import annotations
 from collections.abc import Mapping
 from pathlib import Path
 
-from identification.recording import Recording
 from lab.diagnosis.outcome import Diagnosis
 from lab.diagnosis.restoring import restoring_force
+from lab.show.diagnosed import Diagnosed, about, title_of
 from lab.show.figures.diagnosis import draw_diagnosis
 from lab.show.figures.restoring import restoring_figure
 from lab.show.findings import (
@@ -19,7 +19,6 @@ from lab.show.findings import (
     verdict_of,
 )
 from lab.show.page import checksums, inline, surroundings, template
-from lab.show.signals import measured_inputs
 
 BESIDE = ("diagnosis.json", "extended.xml")
 """Files of the same folder that the report vouches for."""
@@ -28,7 +27,7 @@ BESIDE = ("diagnosis.json", "extended.xml")
 def write_diagnosis_report(
     path: str | Path,
     diagnosis: Diagnosis,
-    recording: Recording,
+    recording: Diagnosed,
     *,
     command: str = "",
     facts: Mapping[str, str] | None = None,
@@ -47,8 +46,8 @@ def write_diagnosis_report(
     force = () if restoring is None else (restoring_figure(restoring),)
     own = {**surroundings(), **checksums(path.parent, BESIDE)}
     page = template("diagnosis.html.jinja").render(
-        title=f"{recording.title or diagnosis.nominal.name}: diagnosis",
-        about=_about(diagnosis, recording),
+        title=title_of(diagnosis, recording),
+        about=about(diagnosis, recording),
         verdict=verdict_of(diagnosis, recording),
         findings=finding_table(diagnosis),
         sentences=[finding.says for finding in diagnosis.findings],
@@ -65,13 +64,3 @@ def write_diagnosis_report(
         facts=list({**(facts or {}), **own}.items()),
     )
     path.write_text(page, encoding="utf-8", newline="\n")
-
-
-def _about(diagnosis: Diagnosis, recording: Recording) -> str:
-    rig, n = diagnosis.nominal, len(recording.records)
-    kinds = ", ".join(sorted({record.kind.replace("_", " ") for record in recording.records}))
-    return (
-        f"Model {rig.name} ({len(rig.dofs)} degrees of freedom, {len(rig.springs)} springs) held against {n} "
-        f"record{'s' if n > 1 else ''} ({kinds}) with {len(measured_inputs(recording))} inputs and "
-        f"{len(recording.outputs)} outputs, {recording.duration:g} s at {recording.sample_rate:g} Hz."
-    )

@@ -199,6 +199,22 @@ def frequency_response(spectrum: Spectra) -> np.ndarray | None:
     return H
 
 
+def coherence(spectrum: Spectra) -> np.ndarray | None:
+    """Multiple coherence of each output with all inputs, 0 to 1, shape (n_outputs, n_frequencies); NaN at dead lines.
+
+    None without inputs, or with fewer than twice as many averages as inputs: pure noise, whose coherence is
+    about inputs over averages, would look explained.
+
+    Source: Bendat and Piersol (2010), Random Data, 4th ed., ch. 7: G_yu G_uu⁻¹ G_uy / G_yy.
+    """
+    H = frequency_response(spectrum)
+    if H is None or spectrum.n_averages < 2 * spectrum.input_density.shape[1]:
+        return None
+    explained = np.sum(H * spectrum.cross_density.conj(), axis=2).real.T
+    lively = spectrum.output_density > 0
+    return np.divide(explained, spectrum.output_density, out=np.full(explained.shape, np.nan), where=lively)
+
+
 def mean_density(spectrum: Spectra) -> np.ndarray:
     """Mean over outputs of density over its own total, shape (n_frequencies,): one curve for mixed units."""
     total = np.sum(spectrum.output_density, axis=1, keepdims=True)

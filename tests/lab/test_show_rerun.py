@@ -16,8 +16,10 @@ from lab.rig import Rig
 from lab.show import structure
 from lab.show.rerun_log import write_rrd
 from lab.show.rerun_log.matrices import scaled
+from lab.show.rerun_log.spectra import level_range
 from lab.show.shapes import dof_shapes
-from tests.lab.showcase import chain_result, chain_rig, motion_of, pulse_recording
+from lab.show.signals import spectra, upper_frequency
+from tests.lab.showcase import RATE, chain_result, chain_rig, motion_of, pulse_recording, random_recording
 from tests.lab.test_show_structure import MIXED
 
 
@@ -94,7 +96,7 @@ def test_every_view_looks_at_an_entity(read):
         "3D": 1 + 3,  # the test and three modes
         "TimeSeries": 3,  # forces, accelerations, displacements
         "TextDocument": 1,
-        "2D": 9 + 2 + 1,  # M, C, K three ways; MAC twice; stabilization diagram
+        "2D": 9 + 2 + 1 + 2,  # M, C, K three ways; MAC twice; stabilization diagram; spectra of two units
     }
     assert read.blueprint.application_id == read.recording.application_id
 
@@ -107,6 +109,30 @@ def test_channels_come_back_one_record_after_the_other(read, recording):
     np.testing.assert_array_equal(values[~gap].T, expected)
     np.testing.assert_allclose(nanoseconds[~gap] / 1e9, np.arange(1200) * recording.dt, atol=1e-9)
     assert read.static("/test/outputs/acceleration_m_s_2", "SeriesLines:names") == ["acc2.x", "acc3.x"]
+
+
+def test_spectra_and_coherence_are_curves_in_decibels(rig, tmp_path):
+    """Without noise the inputs explain all but leakage; levels are 10 log10 of the density, cut at the frame."""
+    recording = random_recording(rig)
+    write_rrd(tmp_path / "run.rrd", chain_result(rig), recording)
+    read = Read(tmp_path / "run.rrd")
+    assert {"/test/spectra/acceleration_m_s_2", "/test/spectra/displacement_m", "/test/coherence"} <= {
+        origin for _, origin in read.views()
+    }
+    (line,) = read.static("/test/coherence/curves/0", "LineStrips2D:strips")
+    height = np.array(line)[:, 1]
+    assert 0 <= np.median(height) < 0.02 * 80  # the frame is 80 high, coherence 1 at its top
+    assert read.static("/test/coherence/legend/2", "Points2D:labels") == ["pos1"]
+    spectrum = spectra(recording)
+    shown = (spectrum.frequency_hz > 0) & (
+        spectrum.frequency_hz <= upper_frequency(RATE, chain_result(rig).modes.frequency_hz)
+    )
+    levels = 10 * np.log10(spectrum.output_density[:2, shown])
+    low, high = level_range([levels])
+    (line,) = read.static("/test/spectra/acceleration_m_s_2/curves/1", "LineStrips2D:strips")
+    drawn = high - np.array(line)[:, 1] / 80 * (high - low)
+    np.testing.assert_allclose(drawn, np.clip(levels[1], low, high), atol=1e-4)  # single precision of 100 dB
+    assert low <= levels.min() or high - low == 100
 
 
 def test_bodies_move_as_the_structure_did(read, rig, motion):

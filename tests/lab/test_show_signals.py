@@ -9,6 +9,7 @@ from hypothesis import strategies as st
 from identification.recording import Channel, Record, Recording
 from identification.systems import SecondOrder
 from lab.show.signals import (
+    coherence,
     envelope,
     frequency_response,
     mean_density,
@@ -160,3 +161,31 @@ def test_frequency_axis_ends_above_the_highest_mode():
     assert upper_frequency(100.0, np.array([1.0, 10.0])) == 15.0
     assert upper_frequency(100.0, np.array([45.0])) == 50.0
     assert upper_frequency(100.0, np.zeros(0)) == 50.0
+
+
+def test_coherence_of_one_input_is_that_of_scipy():
+    u = RNG.standard_normal((1, 4096))
+    y = np.stack([np.convolve(u[0], [1.0, 0.5])[:4096] + RNG.standard_normal(4096), np.zeros(4096)])
+    spectrum = spectra(recording(["random"], [u], [y]), n_segment=256)
+    found = coherence(spectrum)
+    n = 2 * (spectrum.frequency_hz.size - 1)
+    _, expected = scipy.signal.coherence(u[0], y[0], 100.0, "hann", n, detrend="constant")
+    np.testing.assert_allclose(found[0, 1:], expected[1:], rtol=1e-9)  # the same sums in another order
+    assert np.isnan(found[1]).all()  # a dead channel
+
+
+def test_two_inputs_explain_what_either_alone_does_not():
+    u = RNG.standard_normal((2, 8192))
+    y = (u[0] + u[1])[None]
+    both = coherence(spectra(recording(["random"], [u], [y]), n_segment=512))
+    np.testing.assert_allclose(both[0, 1:-1], 1.0, rtol=1e-9)  # exact but for rounding
+    one = coherence(spectra(recording(["random"], [u[:1]], [y]), n_segment=512))
+    assert 0.3 < np.mean(one[0, 1:-1]) < 0.7
+
+
+def test_coherence_needs_more_averages_than_inputs():
+    u = RNG.standard_normal((2, 600))
+    few = spectra(recording(["random"], [u], [u[:1]]), n_segment=512)
+    assert few.n_averages < 4
+    assert coherence(few) is None
+    assert coherence(spectra(recording(["ambient"], [u[:0]], [u]))) is None

@@ -1,7 +1,8 @@
 """A result as one Rerun recording that opens laid out. The only place that imports rerun.
 
-One file per thing shown: `channels` and `scene` make the Test tab, `modes` and `stabilization` the Modes tab,
-and `matrices` the other two. Each logs its entities and returns the views that show them.
+One file per thing shown: `scene`, `channels` and `spectra` make the Test tab, `modes`, `stabilization` and the
+MAC of `matrices` the Modes tab, M, C, K of `matrices` the third. Each logs its entities and returns the views
+that show them.
 """
 
 from __future__ import annotations
@@ -19,10 +20,12 @@ from identification.recording import Recording
 from lab.result import Result
 from lab.show.rerun_log.channels import log_channels
 from lab.show.rerun_log.matrices import log_mac, log_matrices
-from lab.show.rerun_log.modes import log_modes
+from lab.show.rerun_log.modes import MODES_SHARE, grid_columns, log_modes
 from lab.show.rerun_log.plot import plain
 from lab.show.rerun_log.scene import TIMELINE, log_motion, motion_frames
+from lab.show.rerun_log.spectra import log_channel_spectra
 from lab.show.rerun_log.stabilization import log_stabilization
+from lab.show.signals import spectra
 from lab.show.verdict import mode_rows, verdict
 
 if TYPE_CHECKING:
@@ -31,6 +34,8 @@ if TYPE_CHECKING:
 
 MAX_SERIES = 6
 """Time-series views stacked before they get too thin to read."""
+MAX_LINES = 2
+"""Spectra and coherence shown at least."""
 
 
 def write_rrd(
@@ -58,7 +63,7 @@ def write_rrd(
         stream.save(path)
         stream.send_recording_name(title)
         stream.log(
-            "summary", rr.TextDocument(_summary(result), media_type=rr.MediaType.MARKDOWN), static=True
+            "summary", rr.TextDocument(_summary(title, result), media_type=rr.MediaType.MARKDOWN), static=True
         )
         shown = (
             motion_frames(motion, result.modes.frequency_hz)
@@ -67,11 +72,16 @@ def write_rrd(
         )
         end = float(motion.time[shown[-1]]) if motion is not None and shown is not None else 0.0
         scene = log_motion(stream, rig, motion, shown) if rig is not None and motion is not None else []
+        spectrum = spectra(recording)
+        lines = log_channel_spectra(stream, recording, spectrum, result.modes.frequency_hz)
         tabs = [
-            _test_tab(scene, log_channels(stream, recording)),
-            _modes_tab(log_modes(stream, result, rig, end), log_stabilization(stream, result, recording)),
+            _test_tab(scene, log_channels(stream, recording), lines),
+            _modes_tab(
+                log_modes(stream, result, rig, end),
+                log_stabilization(stream, result, spectrum),
+                log_mac(stream, result),
+            ),
             _matrices_tab(log_matrices(stream, result), result),
-            _grid("MAC", log_mac(stream, result), 2),
         ]
         stream.send_blueprint(
             rrb.Blueprint(
@@ -85,24 +95,34 @@ def write_rrd(
         stream.disconnect()
 
 
-def _test_tab(scene: list[rrb.View], series: list[rrb.View]) -> rrb.Container:
+def _test_tab(scene: list[rrb.View], series: list[rrb.View], lines: list[rrb.View]) -> rrb.Container:
+    """The structure above the summary; beside them channels over time, and below these over frequency."""
     summary = rrb.TextDocumentView(origin="/summary", name="Summary")
     left = rrb.Vertical(*scene, summary, row_shares=[3] * len(scene) + [2]) if scene else summary
-    return rrb.Horizontal(left, rrb.Vertical(*series[:MAX_SERIES]), column_shares=[2, 3], name="Test")
+    right = [*series[:MAX_SERIES], *lines[: max(MAX_LINES, MAX_SERIES - len(series))]]
+    return rrb.Horizontal(left, rrb.Vertical(*right), column_shares=[2, 3], name="Test")
 
 
-def _modes_tab(views: list[rrb.View], stabilization: list[rrb.View]) -> rrb.Container | None:
-    """The modes in a grid, below them the stabilization diagram and the key to the numbers of channels."""
+def _modes_tab(
+    views: list[rrb.View], stabilization: list[rrb.View], agreement: list[rrb.View]
+) -> rrb.Container | None:
+    """The modes in a grid; beside them the stabilization diagram, the MAC and the key to numbers of channels."""
     keys = [view for view in views if isinstance(view, rrb.TextDocumentView)]
-    modes, below = [view for view in views if view not in keys], [*stabilization, *keys]
-    if not modes and not below:
+    modes = [view for view in views if view not in keys]
+    beside: list[rrb.View | rrb.Container] = [*stabilization]
+    if agreement:
+        beside.append(rrb.Tabs(*agreement))
+    beside += keys
+    if not modes and not beside:
         return None
-    columns = 4 if len(modes) > 9 else 2 if len(modes) == 4 else 3
-    parts: list[rrb.Container] = [rrb.Grid(*modes, grid_columns=min(len(modes), columns))] if modes else []
-    if below:
-        parts.append(rrb.Horizontal(*below, column_shares=[4] * len(stabilization) + [1] * len(keys)))
-    shares = [3 if len(modes) <= 3 else 2] * bool(modes) + [2 if len(modes) <= 3 else 1] * bool(below)
-    return rrb.Vertical(*parts, name="Modes", row_shares=shares)
+    parts: list[rrb.Container] = []
+    if modes:
+        parts.append(rrb.Grid(*modes, grid_columns=grid_columns(len(modes))))
+    if beside:
+        shares = [4] * len(stabilization) + [4] * bool(agreement) + [1] * len(keys)
+        parts.append(rrb.Vertical(*beside, row_shares=shares))
+    widths = [MODES_SHARE, 1 - MODES_SHARE] if len(parts) == 2 else [1]
+    return rrb.Horizontal(*parts, column_shares=widths, name="Modes")
 
 
 def _matrices_tab(views: list[rrb.View], result: Result) -> rrb.Container | None:
@@ -135,9 +155,9 @@ def _time_panel(result: Result, end: float) -> rrb.TimePanel:
     )
 
 
-def _summary(result: Result) -> str:
+def _summary(title: str, result: Result) -> str:
     """Verdict and modes in Markdown."""
-    lines = [f"# {plain(result.title)}", "", plain(verdict(result).sentence), ""]
+    lines = [f"# {plain(title)}", "", plain(verdict(result).sentence), ""]
     compared = result.comparison is not None
     if len(result.modes):
         lines += ["| Mode | Frequency [Hz] | Damping [%] |" + " Error in frequency | MAC |" * compared]

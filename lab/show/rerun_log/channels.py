@@ -20,11 +20,6 @@ def log_channels(stream: rr.RecordingStream, recording: Recording) -> list[rrb.V
     envelopes = [envelope(record, recording.sample_rate) for record in recording.records]
     lengths = [record.n_samples / recording.sample_rate for record in recording.records]
     starts = np.concatenate([[0.0], np.cumsum(lengths)])
-    first, last = (
-        rr.TimeRangeBoundary.absolute(seconds=0.0),
-        rr.TimeRangeBoundary.absolute(seconds=starts[-1]),
-    )
-    whole = rrb.TimeAxis(link="Independent", view_range=rr.TimeRange(start=first, end=last))
     views: list[rrb.View] = []
     sides: list[tuple[str, tuple[Channel, ...]]] = [
         ("inputs", recording.inputs),

@@ -15,6 +15,7 @@ from identification.recording import Array, Record, Recording
 from lab.diagnosis.outcome import Diagnosis
 from lab.diagnosis.restoring import restoring_force
 from lab.show import structure
+from lab.show.diagnosed import Diagnosed, title_of
 from lab.show.drawing import SERIES, rgb
 from lab.show.findings import calibration_table, error_table, finding_table, verdict_of
 from lab.show.rerun_log.plot import plain
@@ -50,7 +51,7 @@ PLAIN = rr.MediaType.MARKDOWN
 def write_diagnosis_rrd(
     path: str | Path,
     diagnosis: Diagnosis,
-    recording: Recording,
+    recording: Diagnosed,
     *,
     motions: tuple[Motion, Motion] | None = None,
 ) -> None:
@@ -62,7 +63,7 @@ def write_diagnosis_rrd(
         recording: what it was found in, with the channels of the diagnosis; long records are drawn as envelopes.
         motions: of the structure as given and extended, from the start of the first record.
     """
-    title = f"{recording.title or diagnosis.nominal.name}: diagnosis"
+    title = title_of(diagnosis, recording)
     # The viewer keeps one layout per application, so each diagnosis is an application of its own.
     application = "modal lab " + re.sub(r"[^A-Za-z0-9]+", "-", title)
     stream = rr.RecordingStream(application, recording_id=uuid.uuid4())

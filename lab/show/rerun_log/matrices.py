@@ -14,6 +14,8 @@ from lab.show.drawing import diverging, sequential
 from lab.show.rerun_log.plot import log_texts
 from lab.show.tables import MATRICES, same_dofs
 
+LUMA = np.array([0.299, 0.587, 0.114])
+"""Weights of red, green and blue in brightness (Rec. ITU-R BT.601)."""
 MAX_NUMBERED = 12
 """Matrices up to this size carry their numbers."""
 
@@ -62,9 +64,9 @@ def log_mac(stream: rr.RecordingStream, result: Result) -> list[rrb.View]:
     modes, truth = result.modes, result.truth_modes
     if not len(modes):
         return []
-    pairs = [("itself", modes, "MAC of the identified modes among themselves")]
+    pairs = [("itself", modes, "MAC of the identified modes")]
     if truth is not None and len(truth):
-        pairs.insert(0, ("truth", truth, "MAC: identified (rows) against true (columns)"))
+        pairs.insert(0, ("truth", truth, "MAC: identified (rows), true (columns)"))
     views = []
     for name, other, title in pairs:
         value = mac(modes.shapes, other.shapes)
@@ -91,7 +93,11 @@ def _log_heat(
         return
     # The viewer writes a label a little below its point.
     x, y = np.meshgrid(np.arange(m) + 0.5, np.arange(n) + 0.4)
-    log_texts(stream, f"{origin}/numbers", np.stack([x.ravel(), y.ravel()], axis=1), numbers)
+    # The viewer writes on a dark glass: black shows on that before a light colour, white before a dark one.
+    light = colors.reshape(-1, 3) @ LUMA > 150
+    inks = np.where(light[:, None], (0, 0, 0), (255, 255, 255)).astype(np.uint8)
+    places = np.stack([x.ravel(), y.ravel()], axis=1)
+    log_texts(stream, f"{origin}/numbers", places, numbers, inks=inks)
     left = np.stack([np.full(n, -0.3), np.arange(n) + 0.4], axis=1)
     above = np.stack([np.arange(m) + 0.5, np.full(m, -0.4)], axis=1)
     log_texts(stream, f"{origin}/names", np.concatenate([left, above]), [*rows, *columns])

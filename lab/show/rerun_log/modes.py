@@ -26,10 +26,21 @@ MAX_MODES = 12
 MAX_LOOPS = 40
 MAX_NAMED = 6
 """Shapes over up to so many channels carry their names."""
+MODES_SHARE = 0.6
+"""Of the width of the window."""
+WINDOW = (1600.0, 900.0)
+"""Width and height that the layout is made for."""
+TITLE = 30.0
+"""Height of the line above a view."""
+
+
+def grid_columns(n_modes: int) -> int:
+    """Modes side by side, so that each view is wider than high."""
+    return 1 if n_modes <= 3 else 2 if n_modes <= 8 else 3
 
 
 def log_modes(stream: rr.RecordingStream, result: Result, rig: Rig | None, end: float) -> list[rrb.View]:
-    """Logs the modes, the first `MAX_MODES` of them; one view each.
+    """Logs the modes, at most `MAX_MODES` of them; one view each.
 
     Args:
         stream: where to.
@@ -37,28 +48,39 @@ def log_modes(stream: rr.RecordingStream, result: Result, rig: Rig | None, end: 
         rig: the structure, or None to plot shapes over channels.
         end: time [s] up to which the modes keep swinging on the time line of the test.
     """
-    n = min(len(result.modes), MAX_MODES)
+    shown = _shown(result)
     if rig is not None:
         shapes, known = dof_shapes(result, rig.dofs)
         if known.any():
-            return [_log_swing(stream, result, rig, shapes[:, i], known[:, i], i, end) for i in range(n)]
+            return [_log_swing(stream, result, rig, shapes[:, i], known[:, i], i, end) for i in shown]
     rows, shapes = displacement_shapes(result.modes)
-    if not rows or not n:
+    if not rows or not shown:
         return []
     names = [result.modes.outputs[row].name for row in rows]
     return [
-        *[_log_shape(stream, result, aligned(shapes)[:, i], names, i) for i in range(n)],
+        *[_log_shape(stream, result, aligned(shapes)[:, i], names, i) for i in shown],
         _log_names(stream, names),
     ]
+
+
+def _shown(result: Result) -> list[int]:
+    """At most `MAX_MODES` modes by rising frequency: the stable ones first."""
+    stable_first = sorted(range(len(result.modes)), key=lambda i: not result.stable[i])
+    return sorted(stable_first[:MAX_MODES])
 
 
 def _name(result: Result, i: int) -> str:
     """Frequency and damping with their standard deviations, where known."""
     modes = result.modes
     f, z = f"{modes.frequency_hz[i]:.4g}", f"{100 * modes.damping_ratio[i]:.3g}"
-    f += "" if modes.frequency_std is None else f" ± {modes.frequency_std[i]:.1g}"
-    z += "" if modes.damping_std is None else f" ± {100 * modes.damping_std[i]:.1g}"
-    return f"{i + 1}: {f} Hz, damping {z} %" + ("" if result.stable[i] else ", not stable")
+    f += _error_bar(modes.frequency_std, i)
+    z += _error_bar(modes.damping_std, i, 100.0)
+    return f"{i + 1}: {f} Hz, ζ {z} %" + ("" if result.stable[i] else ", not stable")
+
+
+def _error_bar(std: np.ndarray | None, i: int, scale: float = 1.0) -> str:
+    """One standard deviation, where there is one."""
+    return "" if std is None or not std[i] > 0 else f"±{scale * std[i]:.1g}"
 
 
 def _log_swing(
@@ -84,7 +106,15 @@ def _log_swing(
         stream, origin, rig, loop, [rr.TimeColumn(PHASE, sequence=np.arange(PER_LOOP) * 360 // PER_LOOP)]
     )
     seen = "" if known.all() else f" ({int(known.sum())} of {known.size} degrees of freedom known)"
-    return view(origin, _name(result, i) + seen, rig, loop, aspect=2.0)
+    return view(origin, _name(result, i) + seen, rig, loop, aspect=_aspect(len(result.modes)))
+
+
+def _aspect(n_modes: int) -> float:
+    """Width over height of a view among so many."""
+    n = min(n_modes, MAX_MODES)
+    columns = grid_columns(n)
+    rows = -(-n // columns)
+    return (MODES_SHARE * WINDOW[0] / columns) / (WINDOW[1] / rows - TITLE)
 
 
 def _log_shape(

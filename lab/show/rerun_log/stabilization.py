@@ -6,13 +6,12 @@ import numpy as np
 import rerun as rr
 import rerun.blueprint as rrb
 
-from identification.recording import Recording
 from identification.stability import NAMES, STABLE
 from lab.result import Result
 from lab.show.drawing import SERIES, Axes, rgb
 from lab.show.rerun_log.plot import log_axes, log_texts, plot_view
 from lab.show.rerun_log.scene import join
-from lab.show.signals import mean_density, spectra, upper_frequency
+from lab.show.signals import Spectra, mean_density, upper_frequency
 
 ORIGIN = "/modes/stabilization"
 REJECTED = (SERIES[1], SERIES[3], SERIES[4], SERIES[5], SERIES[0], SERIES[7])
@@ -21,15 +20,15 @@ PER_ROW = 5
 FAINT = (120, 120, 120)
 
 
-def log_stabilization(stream: rr.RecordingStream, result: Result, recording: Recording) -> list[rrb.View]:
-    """Logs the diagram; one view, or none where a single order was asked for."""
+def log_stabilization(stream: rr.RecordingStream, result: Result, spectrum: Spectra | None) -> list[rrb.View]:
+    """Logs the diagram over the mean spectrum; one view, or none where a single order was asked for."""
     diagram = result.stabilization
     if diagram is None or not diagram.frequency_hz.size:
         return []
     top = upper_frequency(result.sample_rate, result.modes.frequency_hz)
     axes = Axes((0.0, top), (0.0, 1.05 * float(np.max(diagram.orders))), 400.0, 80.0)
     log_axes(stream, ORIGIN, axes)
-    _log_spectrum(stream, axes, recording)
+    _log_spectrum(stream, axes, spectrum)
     _log_modes(stream, axes, result)
     points, labels = axes.at(diagram.frequency_hz, diagram.orders), np.array(diagram.label)
     reasons = [name for name in NAMES if name in diagram.label]
@@ -55,9 +54,8 @@ def log_stabilization(stream: rr.RecordingStream, result: Result, recording: Rec
     ]
 
 
-def _log_spectrum(stream: rr.RecordingStream, axes: Axes, recording: Recording) -> None:
+def _log_spectrum(stream: rr.RecordingStream, axes: Axes, spectrum: Spectra | None) -> None:
     """The mean spectrum over six decades, as a backdrop."""
-    spectrum = spectra(recording)
     if spectrum is None:
         return
     density = mean_density(spectrum)
