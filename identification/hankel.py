@@ -86,11 +86,9 @@ def shift_invariance(
     # The floor keeps the scaling invertible where a singular value is zero; any scaling gives the same model.
     floor = np.finfo(float).eps * np.max(singular_values[:1], initial=0.0) or 1.0
     root = np.sqrt(np.maximum(singular_values[:n_max], floor))
-    systems = []
-    for n in orders:
-        A = scipy.linalg.solve_triangular(R[:n, :n], X[:n, :n])
-        systems.append((A * root[:n] / root[:n, None], U[:n_outputs, :n] * root[:n]))
-    return systems
+    left, right = scipy.linalg.solve_triangular(R, np.eye(n_max)) / root[:, None], X * root
+    C = U[:n_outputs, :n_max] * root
+    return [(left[:n, :n] @ right[:n, :n], C[:, :n]) for n in orders]
 
 
 def numerical_rank(singular_values: Array, shape: tuple[int, int]) -> int:

@@ -106,6 +106,21 @@ class Modes:
         return f"Modes({listed or 'none'})"
 
 
+def oscillating(poles: Complex, dt: float) -> NDArray[np.bool_]:
+    """Which poles stand for an oscillation: one of each conjugate pair.
+
+    Args:
+        poles: continuous-time [rad/s], of any shape.
+        dt: sample time of the model they come from [s]; 0 for one that is continuous in time.
+
+    Returns:
+        A mask of the same shape.
+    """
+    own = poles.imag > 1e-12 * np.abs(poles)
+    # A sampled pole on the negative real axis has an imaginary logarithm but no partner: not a mode.
+    return np.asarray(own & (poles.imag < (1 - 1e-12) * np.pi / dt) if dt else own)
+
+
 def mac(a: Complex, b: Complex) -> Array:
     """Modal assurance criterion between the shapes of two sets, shape (n_modes_a, n_modes_b), from 0 to 1.
 

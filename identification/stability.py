@@ -23,7 +23,7 @@ from identification.clusters import (
     keep_long,
 )
 from identification.errors import IdentificationError
-from identification.modes import Complex, Modes, modal_phase_collinearity
+from identification.modes import Complex, Modes, modal_phase_collinearity, oscillating
 from identification.recording import Array, frozen
 from identification.systems import Realization
 
@@ -136,12 +136,18 @@ def _sorted_means(poles: Poles, cluster: Indices) -> tuple[Indices, Poles]:
 
 def _all_poles(realization: Realization) -> Poles:
     """One pole of each conjugate pair of every model, by rising order; real poles do not oscillate."""
-    found = [system.modes() for system in realization.systems]
-    order = np.repeat([system.n_states for system in realization.systems], [len(modes) for modes in found])
-    columns = (
-        [getattr(modes, name) for modes in found] for name in ("frequency_hz", "damping_ratio", "shapes")
+    systems = realization.systems
+    found = [system.eigen() for system in systems]
+    shapes = [system.C @ vectors for system, (_, vectors) in zip(systems, found, strict=True)]
+    order = np.repeat(realization.orders, realization.orders)
+    poles = np.concatenate([each for each, _ in found])
+    own = np.flatnonzero(oscillating(poles, systems[0].dt))
+    omega = np.abs(poles[own])
+    rank = np.lexsort((omega, order[own]))
+    own, omega = own[rank], omega[rank]
+    return Poles.normalized(
+        order[own], omega / (2 * np.pi), -poles[own].real / omega, np.concatenate(shapes, axis=1)[:, own]
     )
-    return Poles.normalized(order, *(np.concatenate(column, axis=-1) for column in columns))
 
 
 def _follow(poles: Poles, limits: Thresholds) -> tuple[Indices, Indices]:

@@ -10,7 +10,7 @@ import scipy.linalg
 from numpy.typing import NDArray
 
 from identification.errors import IdentificationError, OrderError
-from identification.modes import Modes
+from identification.modes import Modes, oscillating
 from identification.recording import Array, Channel, frozen
 
 Complex = NDArray[np.complex128]
@@ -101,10 +101,7 @@ class StateSpace:
     def modes(self) -> Modes:
         """Oscillating modes, one for each conjugate pair of poles, sorted by frequency."""
         poles, vectors = self.eigen()
-        # A sampled pole on the negative real axis has an imaginary logarithm but no partner: not a mode.
-        own = poles.imag > 1e-12 * np.abs(poles)
-        if self.dt:
-            own &= poles.imag < (1 - 1e-12) * np.pi / self.dt
+        own = oscillating(poles, self.dt)
         return Modes.from_poles(poles[own], self.C @ vectors[:, own], self.outputs)
 
     def markov(self, n_lags: int) -> MarkovParameters:
