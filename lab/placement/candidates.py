@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from fnmatch import fnmatchcase
+from itertools import combinations
 
 import numpy as np
 
@@ -131,6 +132,13 @@ def require_number(what: str, n: int, candidates: Candidates) -> None:
             f"{n} {what}s asked for, of {len(candidates)} candidates with {len(candidates.fixed)} fixed; expected "
             f"{max(len(candidates.fixed), 1)} to {len(candidates)}"
         )
+
+
+def subsets(n: int, size: int, fixed: Sequence[int]) -> Iterator[tuple[int, ...]]:
+    """Every choice of so many of n candidates, the fixed ones among them, each in rising order."""
+    free = [i for i in range(n) if i not in fixed]
+    for rest in combinations(free, size - len(fixed)):
+        yield tuple(sorted((*fixed, *rest)))
 
 
 def motion_rows(rig: Rig) -> Array:

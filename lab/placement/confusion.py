@@ -12,6 +12,9 @@ from scipy.special import ndtr
 
 from identification.recording import Array
 
+DRAWS = 2000
+"""Of the noise: a probability of a tenth is then known to 0.007."""
+
 
 def confusion(length: Array, cosine: Array) -> Array:
     """Probability that the rival fits better than the cause at work.
@@ -28,6 +31,29 @@ def confusion(length: Array, cosine: Array) -> Array:
     u = ndtr(-length * np.sqrt(np.clip((1 + cosine) / 2, 0, 1)))  # P(u < 0)
     v = ndtr(-length * np.sqrt(np.clip((1 - cosine) / 2, 0, 1)))
     return np.asarray(u * (1 - v) + (1 - u) * v)
+
+
+def mistaken(length: Array, cosine: Array, alike: np.ndarray, *, n_draws: int = DRAWS) -> Array:
+    """Probability that any of many rivals fits better than the cause at work, from drawn data; shape (k,).
+
+    Args:
+        length: of each effect, in standard deviations of the noise, shape (k,).
+        cosine: between effects, shape (k, k).
+        alike: effects that count as right where the other is at work, shape (k, k).
+        n_draws: draws of the noise, the same for every cause; a probability p errs by about √(p (1 - p) / n_draws).
+
+    With x the data, the cause is named whose |x·b| is largest among the unit vectors b, jointly Gaussian with the
+    covariance that the cosines are.
+    """
+    values, vectors = np.linalg.eigh(cosine)
+    root = vectors * np.sqrt(np.maximum(values, 0.0))
+    noise = np.random.default_rng(0).standard_normal((n_draws, len(values))) @ root.T
+    wrong = np.zeros(len(length))
+    for i, right in enumerate(alike):
+        if not np.all(right):
+            fit = np.abs(noise + length[i] * cosine[i])
+            wrong[i] = np.mean(np.max(fit[:, ~right], axis=1) > np.max(fit[:, right], axis=1))
+    return wrong
 
 
 def without(products: Array, n: int, precision: Array) -> Array:

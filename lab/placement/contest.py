@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
-from itertools import combinations
 
 import numpy as np
 import scipy.linalg
@@ -14,7 +13,7 @@ from identification.layout_information import LayoutInformation, layout_informat
 from identification.recording import DERIVATIVE, Array
 from identification.structures import free_matrices
 from lab.errors import LabError
-from lab.placement.candidates import Candidates, require_number
+from lab.placement.candidates import Candidates, require_number, subsets
 from lab.placement.plan import Plan
 from lab.rig import Rig
 
@@ -157,10 +156,10 @@ def possible_layouts(contest: Contest) -> list[Choice]:
     found: list[Choice] = []
     sets = [
         (chosen, contest.held((chosen, ()))[0])
-        for chosen in _subsets(len(contest.sensors), contest.n_sensors, contest.sensors.fixed)
+        for chosen in subsets(len(contest.sensors), contest.n_sensors, contest.sensors.fixed)
     ]
     sensed = np.array([held for _, held in sets]).reshape(-1, len(contest.rig.dofs))
-    for driving in _subsets(len(contest.actuators), contest.n_actuators, contest.actuators.fixed):
+    for driving in subsets(len(contest.actuators), contest.n_actuators, contest.actuators.fixed):
         driven = contest.held(((), driving))[1]
         fits = np.all(sensed | driven, axis=1) & np.any(sensed & driven, axis=1)
         found += [(sets[i][0], driving) for i in np.flatnonzero(fits)]
@@ -184,9 +183,3 @@ def impossible(contest: Contest) -> str:
         f"and K of {n} degrees of freedom; expected at least {n + 1} channels in all, a sensor or an actuator on every "
         "degree of freedom and one with both"
     )
-
-
-def _subsets(n: int, size: int, fixed: Sequence[int]) -> Iterator[tuple[int, ...]]:
-    free = [i for i in range(n) if i not in fixed]
-    for rest in combinations(free, size - len(fixed)):
-        yield tuple(sorted((*fixed, *rest)))

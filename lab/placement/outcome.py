@@ -54,6 +54,7 @@ class CauseFigure:
         visibility: size of its effect, in standard deviations of noise and calibration.
         rival: cause and location that it is most easily taken for, of those that can be told apart; empty when none.
         confusion: probability of naming the rival instead.
+        mistaken: probability of naming any wrong cause.
     """
 
     cause: str
@@ -61,6 +62,7 @@ class CauseFigure:
     visibility: float
     rival: str
     confusion: float
+    mistaken: float
 
 
 @dataclass(frozen=True, eq=False)

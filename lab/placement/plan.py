@@ -18,6 +18,9 @@ SAMPLES_PER_PERIOD, PERIODS = 8, 100
 KINDS = ("random", "burst_random", "multisine", "sweep", "pulse")
 """Signals that are compared."""
 
+LEVELS = (0.1, 1.0, 10.0)
+"""Forces that are compared, as shares of the planned ones."""
+
 
 @dataclass(frozen=True, eq=False)
 class Plan:
@@ -51,8 +54,13 @@ class Plan:
             if not (np.isfinite(value) and value > 0):
                 raise LabError(f"{what} is {value}; expected a positive number")
 
-    def signals(self, rig: Rig) -> list[tuple[str, Array]]:
+    def signals(self, rig: Rig, acting: Sequence[int] | None = None) -> list[tuple[str, Array]]:
         """Kind and inputs (n_inputs, n_samples) of each record, for every connected actuator.
+
+        Args:
+            rig: with the actuators connected.
+            acting: positions of those that act; the others rest, and records in which nothing acts are left out. All
+                of them, in all records, when None.
 
         Raises:
             LabError: the excitation leaves the forces unknown.
@@ -66,7 +74,12 @@ class Plan:
                         f"excitation {load.kind!r} leaves the forces unknown; expected one that measures them, such as random"
                     )
                 found.append((load.kind, np.concatenate([u for u, _ in load.blocks()], axis=1)))
-        return found
+        if acting is None:
+            return found
+        rests = np.setdiff1d(np.arange(len(rig.inputs)), acting)
+        for _, u in found:
+            u[rests] = 0.0
+        return [(kind, u) for kind, u in found if np.any(u)]
 
     def noise_std(self, outputs: tuple[Channel, ...], rms: Array) -> Array:
         """Standard deviation of the noise, shape of `rms`; infinite where an output feels nothing.
@@ -171,16 +184,23 @@ def total_duration(signals: Sequence[tuple[str, Array]], sample_rate: float) -> 
     return sum(u.shape[1] for _, u in signals if np.any(u)) / sample_rate
 
 
-def alternatives(rig: Rig, plan: Plan, frequency_hz: Array) -> Iterator[tuple[str, Plan]]:
-    """The same test with other signals of the same largest force, each with the kind of its signal.
+def alternatives(
+    rig: Rig, plan: Plan, frequency_hz: Array, acting: Sequence[int] | None = None
+) -> Iterator[tuple[str, Plan]]:
+    """The same test with other signals of the same largest force, and at other levels, each with its name.
 
     Args:
         rig: with the actuators connected.
         plan: whose rate, length, noise and largest force are kept.
         frequency_hz: natural frequencies that signals with a band shall cover.
+        acting: positions of the actuators that act; all when None.
     """
-    largest = peak(plan.signals(rig))
+    largest, band = peak(plan.signals(rig, acting)), band_of(frequency_hz, plan.sample_rate)
     for kind in KINDS:
-        made = driving(kind, 1.0, band=band_of(frequency_hz, plan.sample_rate))
-        own = peak(plan.driven(made).signals(rig))
-        yield kind, plan.driven(driving(kind, largest / own, band=band_of(frequency_hz, plan.sample_rate)))
+        own = peak(plan.driven(driving(kind, 1.0, band=band)).signals(rig, acting))
+        yield kind, plan.driven(driving(kind, largest / own, band=band))
+    for level in LEVELS:
+        yield (
+            f"{plan.excitation.kind} as planned, times {level:g}",
+            plan.driven(driving_level(plan.excitation, level)),
+        )

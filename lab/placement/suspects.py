@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from identification.information import planned
-from identification.recording import Array
+from identification.recording import Array, Channel
 from lab.diagnosis.calibrate import parameters_of, survey_of
 from lab.diagnosis.fit import POOL, theta_slopes
 from lab.diagnosis.misfit import Hypothesis, Misfit
@@ -35,6 +35,8 @@ class Suspects:
     Attributes:
         keys: cause and location of each effect; a cause with several variables has several.
         needs: output channels that a cause sits in, as positions; it is no suspect where one is not connected.
+        drives: input channels that it sits in, likewise; it is no suspect where one does not act.
+        acting: input channels that act.
         probes: the change that gives each effect: a hypothesis, or the number of a parameter.
         slopes: of the model's parameters, shape (n_parameters, n_outputs, n_total), per width of their prior.
         effects: at the size of the probes, shape (n_effects, n_outputs, n_total).
@@ -44,6 +46,8 @@ class Suspects:
 
     keys: tuple[tuple[str, str], ...]
     needs: tuple[tuple[int, ...], ...]
+    drives: tuple[tuple[int, ...], ...]
+    acting: tuple[int, ...]
     probes: tuple[Hypothesis | int, ...]
     slopes: Array
     effects: Array
@@ -56,15 +60,17 @@ def suspects(
     plan: Plan,
     *,
     causes: Sequence[str] = (),
+    acting: Sequence[int] | None = None,
     like: Suspects | None = None,
     widths: Mapping[str, float] | None = None,
 ) -> Suspects:
     """Every cause at every place and what it does.
 
     Args:
-        rig: with the candidate outputs and the chosen inputs connected.
+        rig: with the candidate outputs and inputs connected.
         plan: the test.
         causes: names of the causes to consider; the whole catalogue when empty.
+        acting: positions of the inputs that act; all when None.
         like: the same causes at the same physical sizes, from another test of the same rig; proposed anew when None.
         widths: relative tolerance of the model's parameters, as for `lab.diagnose`.
 
@@ -75,7 +81,8 @@ def suspects(
     unknown = [cause for cause in causes if cause not in EFFECTS]
     if unknown:
         raise UnknownNameError(f"cause {unknown[0]!r} does not exist; there are {', '.join(EFFECTS)}")
-    misfit = _misfit(rig, plan, widths)
+    acts = tuple(range(len(rig.inputs)) if acting is None else acting)
+    misfit = _misfit(rig, plan, widths, acts)
     theta = np.zeros(misfit.parameters.n)
     y = misfit.measured
     slopes = -theta_slopes(misfit, theta, (), NO_OBSERVER, misfit.residual(theta), None)
@@ -94,22 +101,29 @@ def suspects(
     if like is not None:
         # What runs away in this test shows itself, but not how: it counts as unseen.
         effects[~np.all(np.isfinite(effects), axis=(1, 2))] = 0.0
-        return replace(like, slopes=slopes, effects=effects, outputs=y)
+        return replace(like, acting=acts, slopes=slopes, effects=effects, outputs=y)
     scale = np.sqrt(np.mean(y**2, axis=1, keepdims=True))
     size = np.max(np.abs(effects) / np.where(scale > 0, scale, np.inf), axis=(1, 2))
     kept = np.isfinite(size) & (size > NOTHING)
     chosen = [probe for probe, is_kept in zip(probes, kept, strict=True) if is_kept]
     keys = tuple(_key(misfit, probe) for probe in chosen)
-    names = [channel.name for channel in rig.outputs]
-    needs = tuple(
-        tuple(names.index(part) for part in location.split("|") if part in names) for _, location in keys
+    needs, drives = (
+        tuple(_positions(location, channels) for _, location in keys)
+        for channels in (rig.outputs, rig.inputs)
     )
-    return Suspects(keys, needs, tuple(chosen), slopes, effects[kept], y, misfit.parameters.precision)
+    precision = misfit.parameters.precision
+    return Suspects(keys, needs, drives, acts, tuple(chosen), slopes, effects[kept], y, precision)
 
 
-def _misfit(rig: Rig, plan: Plan, widths: Mapping[str, float] | None) -> Misfit:
+def _positions(location: str, channels: Sequence[Channel]) -> tuple[int, ...]:
+    """Which of the channels a location names."""
+    names = [channel.name for channel in channels]
+    return tuple(names.index(part) for part in location.split("|") if part in names)
+
+
+def _misfit(rig: Rig, plan: Plan, widths: Mapping[str, float] | None, acting: Sequence[int]) -> Misfit:
     """The planned test of the rig's twin, its outputs as the twin predicts them."""
-    signals = plan.signals(rig)
+    signals = plan.signals(rig, acting)
     test = planned([u for _, u in signals], rig.inputs, rig.outputs, sample_rate=plan.sample_rate)
     model = twin(rig)
     silent = Misfit.of(test, model, parameters_of(model, widths), share=1.0)

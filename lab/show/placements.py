@@ -11,7 +11,7 @@ from lab.show.verdict import FOUND, PASSED, Verdict
 DETAILS = {
     "modes": {"d": "D", "a": "A", "e": "E", "mac": "MAC"},
     "matrices": {"mass": "M [%]", "damping": "C [%]", "stiffness": "K [%]", "d": "D [%]", "e": "E [%]"},
-    "diagnosis": {},
+    "diagnosis": {"any": "Any wrong [%]"},
 }
 """Further figures of a layout, and how they are headed."""
 PERCENT = {"matrices", "diagnosis"}
@@ -94,9 +94,9 @@ def drive_table(placement: Placement) -> Table:
 def cause_table(placement: Placement) -> Table:
     """Causes, the most easily mistaken first."""
     return Table(
-        ("Cause", "Location", "Visible by [std]", "Taken for", "Probability"),
+        ("Cause", "Location", "Visible by [std]", "Taken for", "Probability", "Any wrong"),
         tuple(
-            (c.cause, c.location, f"{c.visibility:.3g}", c.rival, share(c.confusion))
+            (c.cause, c.location, f"{c.visibility:.3g}", c.rival, share(c.confusion), share(c.mistaken))
             for c in placement.causes
         ),
     )

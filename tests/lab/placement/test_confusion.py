@@ -5,7 +5,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from lab.placement.confusion import confusion, lengths_and_cosines, without
+from lab.placement.confusion import confusion, lengths_and_cosines, mistaken, without
 
 
 @pytest.mark.parametrize(("length", "cosine"), [(1.0, 0.0), (2.0, 0.5), (3.0, 0.9), (2.0, -0.7), (0.3, 0.2)])
@@ -30,6 +30,24 @@ def test_never_worse_than_a_coin_and_the_same_for_a_flipped_rival(length, cosine
 def test_a_parallel_rival_and_an_invisible_cause_are_coins():
     assert confusion(np.array(5.0), np.array(1.0)) == 0.5
     assert confusion(np.array(0.0), np.array(0.3)) == 0.5
+
+
+@pytest.mark.parametrize(("length", "cosine"), [(1.0, 0.0), (2.0, 0.5), (3.0, -0.9)])
+def test_of_one_rival_drawn_data_and_the_closed_form_agree(length, cosine):
+    n = 40_000
+    found = mistaken(
+        np.full(2, length), np.array([[1.0, cosine], [cosine, 1.0]]), np.eye(2, dtype=bool), n_draws=n
+    )
+    expected = float(confusion(np.array(length), np.array(cosine)))
+    # Four standard deviations of a count.
+    np.testing.assert_allclose(found, expected, atol=4 * np.sqrt(expected / n))
+
+
+def test_rivals_add_up_and_what_is_alike_counts_as_right():
+    length, right = np.full(4, 2.0), np.eye(4, dtype=bool)
+    alone = mistaken(length[:2], np.eye(2), right[:2, :2])
+    assert np.all(mistaken(length, np.eye(4), right) > alone[0])
+    assert not np.any(mistaken(length, np.ones((4, 4)), np.ones((4, 4), dtype=bool)))
 
 
 def test_parameters_with_a_prior_are_noise_of_their_own():

@@ -1,9 +1,12 @@
 """Target "diagnosis": chances of confusion against drawn data, and what no layout can tell apart."""
 
+from itertools import combinations
+
 import numpy as np
 import pytest
 
 from lab.errors import LabError, UnknownNameError
+from lab.placement import teams
 from lab.placement.arena import arena_of
 from lab.placement.place import place
 from lab.placement.plan import Plan, driving
@@ -23,7 +26,7 @@ def arena():
 
 
 def test_causes_are_confused_as_often_as_in_drawn_data(arena):
-    found, std = arena
+    found, std = arena, arena.noise_std
     channels, n = [0, 2], 4000
     rng = np.random.default_rng(1)
     J, effects = found.suspects.slopes, found.suspects.effects * found.sizes[:, None, None]
@@ -43,7 +46,7 @@ def test_causes_are_confused_as_often_as_in_drawn_data(arena):
 
 
 def test_causes_in_channels_that_are_not_connected_are_no_suspects(arena):
-    found, _ = arena
+    found = arena
     _, confused, _ = found.confusions([0, 2])
     missing = found.keys.index(("sensor_gain", "a2.x"))
     assert np.isnan(confused[missing])
@@ -58,8 +61,58 @@ def test_less_noise_makes_less_confusion():
     )
     assert quiet.figure < loud.figure
     assert quiet.proven
-    assert quiet.n_layouts == 3
+    assert quiet.n_layouts == 3 * 3
     assert quiet.figure == quiet.figures[0]
+
+
+def test_actuators_are_those_with_which_causes_are_mistaken_least():
+    rig, own = row_of_masses(3), plan(noise=5.0)
+    best = place(rig, 2, n_actuators=1, target="diagnosis", plan=own, size=0.05, causes=CAUSES)
+    everything = arena_of(rig, own, 0.05, CAUSES)
+    figures = {}
+    for acting in range(3):
+        arena = everything.under(rig, own, [acting])
+        for channels in combinations(range(3), 2):
+            # The mean of the likeliest confusions, written out.
+            P = np.array([c for c in arena.confusions(channels)[1] if np.isfinite(c)])
+            figures[channels, acting] = np.sum(P) / len(P)
+    channels, acting = min(figures, key=figures.get)
+    assert (best.sensors, best.actuators) == (tuple(f"a{i + 1}.x" for i in channels), (f"f{acting + 1}",))
+    # Sums of the same numbers in another order.
+    np.testing.assert_allclose(best.figures, sorted(figures.values()), rtol=1e-9)
+    rows = {row.name: row for row in best.ranking}
+    assert rows["worst"].figure == pytest.approx(max(figures.values()), rel=1e-9)
+    assert rows["best"].details["any"] < rows["worst"].details["any"]
+
+
+def test_of_too_many_sets_of_actuators_the_likeliest_are_compared_and_that_is_told(monkeypatch):
+    rig, own = row_of_masses(4), plan(noise=5.0)
+    causes = ("cubic_stiffness", "coulomb_friction")
+    every = place(rig, 2, n_actuators=1, target="diagnosis", plan=own, causes=causes)
+    monkeypatch.setattr(teams, "TEAMS", 2)
+    some = place(rig, 2, n_actuators=1, target="diagnosis", plan=own, causes=causes)
+    assert (every.proven, some.proven, some.floor) == (True, False, None)
+    assert every.figure <= some.figure
+    assert any("of 4 sets of actuators 2 were compared" in warning for warning in some.warnings)
+
+
+def test_causes_in_actuators_that_rest_are_no_suspects():
+    rig, own = row_of_masses(3), plan()
+    arena = arena_of(rig, own, 0.05, CAUSES).under(rig, own, [0])
+    _, confused, _ = arena.confusions([0, 1, 2])
+    known = {key: value for key, value in zip(arena.keys, confused, strict=True) if key[0] == "actuator_gain"}
+    assert np.isfinite(known["actuator_gain", "f1"])
+    assert np.isnan(known["actuator_gain", "f2"])
+
+
+def test_any_wrong_cause_is_named_at_least_as_often_as_the_likeliest(arena):
+    channels = [0, 1, 2]
+    _, confused, _ = arena.confusions(channels)
+    wrong = arena.mistakes(channels)
+    np.testing.assert_array_equal(np.isnan(wrong), np.isnan(confused))
+    # Four standard deviations of a count of 2000.
+    slack = 4 * np.sqrt(confused * (1 - confused) / 2000)
+    assert np.all((wrong >= confused - slack)[np.isfinite(wrong)])
 
 
 def test_nonlinear_causes_show_at_high_levels_and_linear_ones_need_none():
