@@ -10,7 +10,7 @@ import numpy as np
 
 from identification.recording import Array
 from lab.placement.confusion import confusion, lengths_and_cosines, mistaken, without
-from lab.placement.plan import Plan
+from lab.placement.plan import Plan, driving_level
 from lab.placement.suspects import Suspects, suspects
 from lab.rig import Rig
 
@@ -115,8 +115,21 @@ class Arena:
         return found
 
 
-def arena_of(rig: Rig, plan: Plan, size: float, causes: Sequence[str]) -> Arena:
-    """The causes at the size asked for, where all actuators are at work."""
+def arena_of(
+    rig: Rig, plan: Plan, size: float, causes: Sequence[str], *, n_acting: int | None = None
+) -> Arena:
+    """The causes at the size asked for, where all actuators are at work.
+
+    Args:
+        rig: with the candidates connected.
+        plan: the test.
+        size: RMS change of the outputs, as a share of their RMS.
+        causes: names; the whole catalogue when empty.
+        n_acting: how many of the actuators the test will have: all together are driven as much less, so that stops, slack
+            and friction are of a size that it reaches. All when None.
+    """
+    if n_acting is not None and n_acting < len(rig.inputs):
+        plan = plan.driven(driving_level(plan.excitation, np.sqrt(n_acting / len(rig.inputs))))
     found = suspects(rig, plan, causes=causes)
     std = noise_of(rig, plan, found.outputs)
     power = np.mean(found.outputs**2, axis=1)

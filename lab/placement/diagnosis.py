@@ -42,7 +42,7 @@ def place_diagnosis(
         n_sensors, n_actuators: how many to choose.
         plan: the test.
         size: of the effects: RMS change of the outputs, as a share of their RMS, over all candidates, when all
-            actuators act.
+            actuators act with as much force together as those chosen will.
         causes: names of the causes to tell apart; the whole catalogue when empty.
         planned: sensors and actuators of a layout to be ranked too.
         limit: number of layouts of sensors up to which all are compared, for each set of actuators.
@@ -59,7 +59,7 @@ def place_diagnosis(
         inputs=[rig.inputs[i].name for i in sorted(actuators.channels_of(range(len(actuators))))]
     )
     actuators = replace(actuators, channels=tuple((i,) for i in range(len(actuators))))
-    everything = arena_of(rig, plan, size, causes)
+    everything = arena_of(rig, plan, size, causes, n_acting=n_actuators)
     teams = Teams(rig, plan, everything, sensors, actuators, n_sensors, n_actuators, limit)
     teams.compare()
     chosen, acting = teams.best

@@ -68,7 +68,7 @@ def test_less_noise_makes_less_confusion():
 def test_actuators_are_those_with_which_causes_are_mistaken_least():
     rig, own = row_of_masses(3), plan(noise=5.0)
     best = place(rig, 2, n_actuators=1, target="diagnosis", plan=own, size=0.05, causes=CAUSES)
-    everything = arena_of(rig, own, 0.05, CAUSES)
+    everything = arena_of(rig, own, 0.05, CAUSES, n_acting=1)
     figures = {}
     for acting in range(3):
         arena = everything.under(rig, own, [acting])
