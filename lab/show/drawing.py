@@ -80,6 +80,19 @@ def ticks(low: float, high: float, n: int) -> list[float]:
     return [float(f"{k * step:.12g}") for k in range(first, last + 1)]
 
 
+def round_range(values: np.ndarray) -> tuple[float, float]:
+    """Smallest and largest value, widened to round ones; what is no number is left out."""
+    known = values[np.isfinite(values)]
+    if not known.size:
+        return -0.5, 0.5
+    low, high = float(np.min(known)), float(np.max(known))
+    if not high > low:
+        return low - 0.5, low + 0.5
+    step = np.diff(ticks(low, high, 8))
+    size = float(step[0]) if step.size else high - low
+    return size * float(np.floor(low / size)), size * float(np.ceil(high / size))
+
+
 def diverging(values: np.ndarray, limit: float) -> np.ndarray:
     """Colours of signed values, (*values.shape, 3) uint8: blue at -limit, near white at 0, red at +limit."""
     level = np.clip(np.nan_to_num(np.asarray(values, dtype=float)) / (limit or 1.0), -1, 1)

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 
 from identification.recording import Recording
 from lab.diagnosis.outcome import CONSISTENT, EXPLAINED, Diagnosis, Quantity
+from lab.show.diagnosed import Diagnosed
 from lab.show.residuals import Leftover, leftover
 from lab.show.tables import with_std
 from lab.show.verdict import FAILED, FOUND, PASSED, Verdict
@@ -28,7 +29,7 @@ class Table:
     rows: tuple[tuple[str, ...], ...]
 
 
-def verdict_of(diagnosis: Diagnosis, recording: Recording) -> Verdict:
+def verdict_of(diagnosis: Diagnosis, recording: Diagnosed) -> Verdict:
     """What the diagnosis comes to, in a few sentences for an engineer."""
     e = diagnosis.errors
     if diagnosis.verdict == CONSISTENT and diagnosis.spectra is not None:
@@ -55,6 +56,7 @@ def verdict_of(diagnosis: Diagnosis, recording: Recording) -> Verdict:
         return Verdict(
             FAILED, f"Unexplained: {told}.{f' What was explained so far: {said}' if said else ''} {fall}"
         )
+    assert isinstance(recording, Recording)  # responses are spectra, told above
     so_far = f" What was explained so far: {said}" if said else ""
     left = "Unexplained: something is left that no cause in the catalogue explains, "
     return Verdict(FAILED, f"{left}{where(leftover(diagnosis, recording))}.{so_far} {fall}")
@@ -110,6 +112,41 @@ def alternative_table(diagnosis: Diagnosis) -> Table:
     return Table(heads + (("To tell them apart",) if advised else ()), rows)
 
 
+@dataclass(frozen=True)
+class Ranked:
+    """A cause that was weighed, and its evidence.
+
+    Attributes:
+        text: cause and place.
+        log_evidence_gain: natural logarithm of how much more probable the data are with it than without.
+        found: whether it is a finding, or only another explanation of the first one.
+    """
+
+    text: str
+    log_evidence_gain: float
+    found: bool
+
+
+def ranked_causes(diagnosis: Diagnosis) -> tuple[Ranked, ...]:
+    """The findings in their order, then the other explanations of the first one, best first."""
+    findings = [
+        Ranked(f"{words(f.effect.cause)} at {place(f.effect.location)}", f.log_evidence_gain, True)
+        for f in diagnosis.findings
+    ]
+    others = [
+        Ranked(f"{words(a.cause)} at {place(a.location)}", a.log_evidence_gain, False)
+        for a in diagnosis.alternatives
+    ]
+    return (*findings, *others)
+
+
+def place(location: str) -> str:
+    """A location as one reads it."""
+    if location == "*":
+        return "all places alike"
+    return " and ".join("the ground" if part == "world" else part for part in location.split("|"))
+
+
 def error_table(diagnosis: Diagnosis) -> Table:
     """The four errors, also as multiples of the noise floor."""
     floor = diagnosis.errors.noise_floor
@@ -149,7 +186,7 @@ def parameter(name: str, quantity: Quantity) -> str:
     value = with_std(quantity.value, quantity.std)
     if " ± " in value and unit:
         value = f"({value})"
-    return f"{name} = {value}{unit}"
+    return f"{words(name.removesuffix('_hz'))} = {value}{unit}"
 
 
 def evidence(value: float) -> str:

@@ -16,6 +16,8 @@ MODELS = ("nominal", "calibrated", "extended")
 N_WINDOWS = 60
 """Stretches into which all records together are cut."""
 
+CLOSE_UP = 150
+"""Samples of a close-up."""
 MAX_ROWS = 6
 """Spectra shown."""
 
@@ -86,6 +88,25 @@ def relative_errors(diagnosis: Diagnosis, model: str) -> Array:
     error = rms([residual(p, model)[:, first:] for p, first in parts])
     signal = rms([p.measured[:, first:] for p, first in parts])
     return np.divide(error, signal, out=np.zeros_like(error), where=signal > 0)
+
+
+def worst_stretch(diagnosis: Diagnosis, n_samples: int) -> tuple[int, int]:
+    """Record in which the model as given errs most, and the sample in it where a close-up begins.
+
+    The close-up is where the calibrated model errs most, within the samples kept aside.
+    """
+    scale = signal_rms(diagnosis)
+    scale = np.where(scale > 0, scale, 1.0)
+    sizes = [np.max(rms([residual(p, "nominal")]) / scale) for p in diagnosis.predictions]
+    number = int(np.argmax(sizes))
+    prediction = diagnosis.predictions[number]
+    n = prediction.measured.shape[1]
+    first = min(prediction.first_held_out, max(0, n - n_samples))
+    power = np.nansum((residual(prediction, "calibrated") / scale[:, None]) ** 2, axis=0)[first:]
+    if power.size <= n_samples:
+        return number, first
+    total = np.concatenate([[0.0], np.cumsum(power)])
+    return number, first + int(np.argmax(total[n_samples:] - total[:-n_samples]))
 
 
 def levels(diagnosis: Diagnosis, sample_rate: float) -> list[Levels]:

@@ -249,8 +249,9 @@ def test_every_view_looks_at_an_entity(read):
     views = read.views()
     assert [origin for _, origin in views if origin not in read.entities] == []
     kinds = [kind for kind, _ in views]
-    # Two channels, predicted and residual; two structures; one summary; the force of the spring that hardens.
-    expected = {"TimeSeries": 4, "3D": 2, "TextDocument": 1, "2D": 1}
+    # Two channels, predicted and residual; two structures; one summary; as plots the ranked causes, the residual of
+    # two channels over frequency and over amplitude, and the force of the spring that hardens.
+    expected = {"TimeSeries": 4, "3D": 2, "TextDocument": 1, "2D": 6}
     assert {kind: kinds.count(kind) for kind in kinds} == expected
     assert "/structure/extended/bodies/mass1" in read.entities
 
@@ -276,3 +277,49 @@ def test_the_viewer_reads_the_verdict(read):
     (text,) = read.static("/summary", "TextDocument:text")
     assert "Explained: The spring" in text
     assert "cubic stiffness" in text
+
+
+def test_the_close_up_is_no_envelope(diagnosis, recording, tmp_path):
+    """Of a record too long to be drawn whole, the stretch that opens has every sample."""
+    n = 20_000
+    u, *y = np.random.default_rng(0).standard_normal((3, 1, n))
+    y = np.concatenate(y)
+    off = y + 0.1
+    off[:, 15_000:15_100] += 3.0  # the calibrated model errs most here
+    long = replace(recording, records=(replace(recording.records[0], inputs=u, outputs=y),))
+    wrong = replace(diagnosis, predictions=(Prediction(y, off, off, y, 14_000),))
+    write_diagnosis_rrd(tmp_path / "run.rrd", wrong, long)
+    read = Read(tmp_path / "run.rrd")
+    (entity,) = (name for name in read.entities if name.startswith("/predictions") and "acc0" in name)
+    nanoseconds, values = read.series(entity, "Scalars:scalars")
+    assert values.shape[0] < n / 2
+    at = np.round(nanoseconds / 1e9 * RATE, 6)
+    within = (at >= 14_800) & (at < 15_300)
+    np.testing.assert_array_equal(at[within], np.arange(14_800, 15_300))
+    np.testing.assert_array_equal(values[within, 0], y[0, 14_800:15_300])
+
+
+def test_the_finding_is_marked_in_both_structures(read, diagnosis):
+    """An arc from end to end of the spring: it begins at one mass and ends at the other, in every frame."""
+    for name in ("nominal", "extended"):
+        entity = f"/structure/{name}/findings/\\0"
+        if entity not in read.entities:
+            entity = f"/structure/{name}/findings/0"
+        _, arc = read.series(entity, "LineStrips3D:strips")
+        for end, body in ((0, "mass0"), (-1, "mass1")):
+            _, place = read.series(f"/structure/{name}/bodies/{body}", "Transform3D:translation")
+            # Single precision of metres; a spring is drawn from centre to centre.
+            np.testing.assert_allclose(arc[:, 0, end], place[:, 0], atol=1e-5)
+        text = read.static(f"{entity}/label", "Points3D:labels")
+        assert text == ["cubic stiffness at spring0_1"]
+
+
+def test_causes_are_ranked_by_evidence(read):
+    bars = np.array(read.static("/causes", "LineStrips2D:strips"))
+    length = bars[:, 1, 0]
+    assert length[0] > length[1] > length[2]
+    # As long as the power of ten: 1234.5 and 800.25.
+    assert length[1] / length[0] == pytest.approx(math.log10(801.25) / math.log10(1235.5), rel=1e-6)
+    texts = read.static("/causes/names", "Points2D:labels")
+    assert texts[0] == "found: cubic stiffness at spring0_1, 1234"
+    assert texts[1] == "instead of the first: bilinear stiffness at spring0_1, 800.2"

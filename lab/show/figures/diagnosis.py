@@ -10,23 +10,22 @@ from matplotlib.figure import Figure
 
 from identification.recording import Array, Record, Recording
 from lab.diagnosis.outcome import Diagnosis, Prediction
+from lab.show.diagnosed import Diagnosed
 from lab.show.drawing import SERIES
 from lab.show.figures.canvas import Drawing, drawing, few_ticks, logarithmic, plain
 from lab.show.residuals import (
+    CLOSE_UP,
     levels,
     relative_errors,
-    residual,
     residual_spectra,
-    rms,
     shown_models,
     signal_rms,
+    worst_stretch,
 )
 from lab.show.signals import envelope, spectra
 
 MAX_OUTPUTS = 6
 """Outputs shown: those with the largest error of the calibrated model."""
-CLOSE_UP = 150
-"""Samples of the close-up."""
 MEASURED: dict[str, Any] = {"color": "0.65", "linewidth": 2.2}
 LOOKS: dict[str, dict[str, Any]] = {
     "nominal": {"color": SERIES[1], "linestyle": (0, (1, 1))},
@@ -37,12 +36,13 @@ FLOOR: dict[str, Any] = {"color": "black", "linestyle": (0, (3, 1, 1, 1)), "line
 FLOOR_SAYS = "The noise floor is drawn as the same share of the signal in every channel."
 
 
-def draw_diagnosis(diagnosis: Diagnosis, recording: Recording) -> list[Drawing]:
+def draw_diagnosis(diagnosis: Diagnosis, recording: Diagnosed) -> list[Drawing]:
     """All figures that the data support, in the order of the report."""
     if diagnosis.spectra is not None:
         from lab.show.figures.spectral import draw_spectra
 
         return [draw_spectra(diagnosis, diagnosis.spectra)]
+    assert isinstance(recording, Recording)  # responses are spectra, drawn above
     rows = worst_outputs(diagnosis)
     drawings = [
         predictions(diagnosis, recording, rows),
@@ -61,13 +61,9 @@ def worst_outputs(diagnosis: Diagnosis) -> list[int]:
 
 def predictions(diagnosis: Diagnosis, recording: Recording, rows: list[int]) -> Drawing:
     """Measured and predicted outputs of one record: the whole as bands, and a close-up sample by sample."""
-    scale = signal_rms(diagnosis)
-    scale = np.where(scale > 0, scale, 1.0)[:, None]
-    sizes = [np.max(rms([residual(p, "nominal")]) / scale[:, 0]) for p in diagnosis.predictions]
-    number = int(np.argmax(sizes))
+    number, start = worst_stretch(diagnosis, CLOSE_UP)
     prediction, rate = diagnosis.predictions[number], recording.sample_rate
     models = shown_models(diagnosis)
-    start = _worst_stretch(prediction, scale)
     shown = slice(start, start + CLOSE_UP)
     time = np.arange(prediction.measured.shape[1]) / rate
 
@@ -98,17 +94,6 @@ def predictions(diagnosis: Diagnosis, recording: Recording, rows: list[int]) -> 
         "kept out of every fit in which the calibrated model errs most (shaded on the left)."
     )
     return drawing("prediction", 0.7 + 0.9 * len(rows), caption + _left_out(rows, recording), paint)
-
-
-def _worst_stretch(prediction: Prediction, scale: Array) -> int:
-    """Start of the close-up: where the calibrated model errs most, within the samples kept aside."""
-    n = prediction.measured.shape[1]
-    first = min(prediction.first_held_out, max(0, n - CLOSE_UP))
-    power = np.nansum((residual(prediction, "calibrated") / scale) ** 2, axis=0)[first:]
-    if power.size <= CLOSE_UP:
-        return first
-    total = np.concatenate([[0.0], np.cumsum(power)])
-    return first + int(np.argmax(total[CLOSE_UP:] - total[:-CLOSE_UP]))
 
 
 def _bands(axes: Axes, prediction: Prediction, row: int, rate: float, names: tuple[str, ...]) -> None:

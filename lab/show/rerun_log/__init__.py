@@ -12,7 +12,6 @@ import uuid
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-import numpy as np
 import rerun as rr
 import rerun.blueprint as rrb
 
@@ -22,7 +21,7 @@ from lab.show.rerun_log.channels import log_channels
 from lab.show.rerun_log.matrices import log_mac, log_matrices
 from lab.show.rerun_log.modes import MODES_SHARE, grid_columns, log_modes
 from lab.show.rerun_log.plot import plain
-from lab.show.rerun_log.scene import TIMELINE, log_motion, motion_frames
+from lab.show.rerun_log.scene import log_motion, motion_frames, time_panel
 from lab.show.rerun_log.spectra import log_channel_spectra
 from lab.show.rerun_log.stabilization import log_stabilization
 from lab.show.signals import spectra
@@ -88,7 +87,7 @@ def write_rrd(
                 rrb.Tabs(*[tab for tab in tabs if tab is not None]),
                 rrb.BlueprintPanel(state="collapsed"),
                 rrb.SelectionPanel(state="collapsed"),
-                _time_panel(result, end),
+                time_panel(result.modes.frequency_hz, end),
             )
         )
     finally:
@@ -137,22 +136,6 @@ def _matrices_tab(views: list[rrb.View], result: Result) -> rrb.Container | None
 
 def _grid(name: str, views: list[rrb.View], columns: int) -> rrb.Container | None:
     return rrb.Grid(*views, grid_columns=min(columns, len(views)), name=name) if views else None
-
-
-def _time_panel(result: Result, end: float) -> rrb.TimePanel:
-    """The lowest mode swings about once in two seconds; the stretch with moving pictures runs in a loop."""
-    if end <= 0:
-        return rrb.TimePanel(state="collapsed", timeline=TIMELINE)
-    lowest = float(np.min(result.modes.frequency_hz)) if len(result.modes) else 0.5
-    selection = rrb.components.AbsoluteTimeRange(0, round(1e9 * end))
-    return rrb.TimePanel(
-        state="collapsed",
-        timeline=TIMELINE,
-        playback_speed=float(f"{0.5 / lowest:.1g}") if lowest > 0 else 1.0,
-        loop_mode="selection",
-        time_selection=selection,
-        play_state="playing",
-    )
 
 
 def _summary(title: str, result: Result) -> str:

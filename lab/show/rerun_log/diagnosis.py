@@ -1,4 +1,4 @@
-"""A diagnosis: measured against predictions, what each model leaves, and both structures side by side."""
+"""A diagnosis: what it says and where, measured against predictions, and what each model leaves."""
 
 from __future__ import annotations
 
@@ -11,41 +11,32 @@ import numpy as np
 import rerun as rr
 import rerun.blueprint as rrb
 
-from identification.recording import Array, Record, Recording
+from identification.recording import Recording
 from lab.diagnosis.outcome import Diagnosis
 from lab.diagnosis.restoring import restoring_force
-from lab.show import structure
 from lab.show.diagnosed import Diagnosed, title_of
-from lab.show.drawing import SERIES, rgb
 from lab.show.findings import calibration_table, error_table, finding_table, verdict_of
-from lab.show.rerun_log.plot import plain
-from lab.show.rerun_log.restoring import log_restoring
-from lab.show.rerun_log.scene import (
-    MAX_NAMED,
-    TIMELINE,
-    join,
-    log_frames,
-    log_solids,
-    motion_frames,
-    view,
+from lab.show.rerun_log.leftovers import (
+    log_over_amplitude,
+    log_over_frequency,
+    log_over_time,
+    log_predictions,
 )
+from lab.show.rerun_log.plot import plain
+from lab.show.rerun_log.ranking import log_ranking
+from lab.show.rerun_log.restoring import log_restoring
+from lab.show.rerun_log.scene import time_panel
+from lab.show.rerun_log.side_by_side import log_structures
 from lab.show.rerun_log.spectra import log_spectra
-from lab.show.residuals import relative_errors, residual, shown_models, worst_rows
-from lab.show.signals import envelope
+from lab.show.residuals import relative_errors, shown_models, worst_rows
 
 if TYPE_CHECKING:
-    from lab.rig import Rig
     from lab.simulate import Motion
 
 MAX_CHANNELS = 6
-"""Outputs shown: those with the largest error of the calibrated model."""
-COLORS = {
-    "measured": SERIES[7],
-    "nominal": SERIES[1],
-    "calibrated": SERIES[4],
-    "extended": SERIES[0],
-}
-PLAIN = rr.MediaType.MARKDOWN
+"""Outputs predicted: those with the largest error of the calibrated model."""
+MAX_RESIDUALS = 3
+"""Outputs whose residual is drawn over time, frequency and amplitude."""
 
 
 def write_diagnosis_rrd(
@@ -71,132 +62,73 @@ def write_diagnosis_rrd(
         stream.save(path)
         stream.send_recording_name(title)
         text = _summary(title, diagnosis, recording)
-        stream.log("summary", rr.TextDocument(text, media_type=PLAIN), static=True)
-        models = shown_models(diagnosis)
+        stream.log("summary", rr.TextDocument(text, media_type=rr.MediaType.MARKDOWN), static=True)
+        ranking = log_ranking(stream, diagnosis)
         summary = rrb.TextDocumentView(origin="/summary", name="Summary")
+        left = rrb.Vertical(summary, *ranking, row_shares=[3] + [2] * len(ranking))
         if diagnosis.spectra is not None:
-            plots = log_spectra(stream, diagnosis.spectra, worst_rows(diagnosis.spectra), models)
-            tab = rrb.Horizontal(summary, rrb.Vertical(*plots), column_shares=[2, 3], name="Spectra")
+            rows = worst_rows(diagnosis.spectra)
+            plots = log_spectra(stream, diagnosis.spectra, rows, shown_models(diagnosis))
+            tab = rrb.Horizontal(left, rrb.Vertical(*plots), column_shares=[2, 3], name="Diagnosis")
             stream.send_blueprint(rrb.Blueprint(rrb.Tabs(tab), rrb.TimePanel(state="hidden")))
             return
-        errors = relative_errors(diagnosis, "calibrated")
-        rows = sorted(int(row) for row in np.argsort(-errors, kind="stable")[:MAX_CHANNELS])
-        predicted = [
-            _log_lines(
-                stream,
-                join("/predictions", recording.outputs[row].name),
-                recording,
-                row,
-                {
-                    name: [getattr(p, name)[row] for p in diagnosis.predictions]
-                    for name in ("measured", *models)
-                },
-            )
-            for row in rows
-        ]
-        left = [
-            _log_lines(
-                stream,
-                join("/residuals", recording.outputs[row].name),
-                recording,
-                row,
-                {name: [residual(p, name)[row] for p in diagnosis.predictions] for name in models},
-            )
-            for row in rows
-        ]
-        tabs: list[rrb.Container] = [
-            rrb.Horizontal(
-                summary, rrb.Vertical(*predicted), column_shares=[2, 3], name="Measured and predicted"
-            ),
-            rrb.Vertical(*left, name="Residuals"),
-        ]
+        assert isinstance(recording, Recording)  # responses are spectra, shown above
+        worst = np.argsort(-relative_errors(diagnosis, "calibrated"), kind="stable")
+        rows = sorted(int(row) for row in worst[:MAX_CHANNELS])
+        few = sorted(int(row) for row in worst[:MAX_RESIDUALS])
+        predicted = dict(zip(rows, log_predictions(stream, diagnosis, recording, rows), strict=True))
+        structures = [] if motions is None else log_structures(stream, diagnosis, motions)
+        n_first = 2 if structures else 4
+        first = [predicted.pop(int(row)) for row in worst[:n_first]]
+        tabs: list[rrb.Container] = [_first_tab(left, structures, first)]
+        if predicted:
+            tabs.append(rrb.Vertical(*predicted.values(), name="Further outputs"))
+        tabs.append(_residual_tab(stream, diagnosis, recording, few))
         restoring = restoring_force(diagnosis, recording)
         if restoring is not None:
             tabs.append(rrb.Vertical(log_restoring(stream, restoring), name="Restoring force"))
-        if motions is not None:
-            tabs.append(rrb.Horizontal(*_log_structures(stream, diagnosis, motions), name="Structure"))
+        lowest = diagnosis.nominal.second_order().modes().frequency_hz
+        end = 0.0 if motions is None else float(motions[0].time[-1])
         stream.send_blueprint(
             rrb.Blueprint(
                 rrb.Tabs(*tabs),
                 rrb.BlueprintPanel(state="collapsed"),
                 rrb.SelectionPanel(state="collapsed"),
-                rrb.TimePanel(state="collapsed", timeline=TIMELINE),
+                time_panel(lowest, end),
             )
         )
     finally:
         stream.disconnect()
 
 
-def _log_lines(
-    stream: rr.RecordingStream, origin: str, recording: Recording, row: int, lines: dict[str, list[Array]]
-) -> rrb.View:
-    """Logs signals of one channel as one line each, records one after the other; one view."""
-    channel, rate = recording.outputs[row], recording.sample_rate
-    start = 0.0
-    times: list[Array] = []
-    values: list[Array] = []
-    for parts in zip(*lines.values(), strict=True):
-        together = envelope(Record("other", np.zeros((0, 0)), np.stack(parts)), rate)
-        if times and together.time.size:
-            # A gap between records, so that no line joins them.
-            times.append(np.array([start - 1e-9]))
-            values.append(np.full((len(parts), 1), np.nan))
-        times.append(start + together.time)
-        values.append(together.outputs)
-        start += parts[0].size / rate
-    names = list(lines)
-    style = rr.SeriesLines(
-        names=names,
-        colors=[rgb(COLORS[name]) for name in names],
-        widths=[2.0 if name == "measured" else 1.0 for name in names],
-        aggregation_policy=rr.components.AggregationPolicy.MinMax,
-    )
-    stream.log(origin, style, static=True)
-    stream.send_columns(
-        origin,
-        [rr.TimeColumn(TIMELINE, duration=np.concatenate(times))],
-        rr.Scalars.columns(scalars=np.ascontiguousarray(np.concatenate(values, axis=1).T)),
-    )
-    ends = (rr.TimeRangeBoundary.absolute(seconds=t) for t in (0.0, start))
-    whole = rrb.TimeAxis(view_range=rr.TimeRange(*ends))
-    return rrb.TimeSeriesView(
-        origin=origin,
-        name=f"{channel.name} [{channel.unit}]",
-        plot_legend=rrb.PlotLegend(corner="RightTop"),
-        axis_x=whole,
-    )
+def _first_tab(left: rrb.Container, structures: list[rrb.View], predicted: list[rrb.View]) -> rrb.Container:
+    """Words and causes; beside them both structures, and below these the outputs missed most."""
+    parts: list[rrb.View | rrb.Container] = [*predicted]
+    if structures:
+        parts.insert(0, rrb.Horizontal(*structures))
+    shares = [3] * bool(structures) + [1.5] * len(predicted)
+    right = rrb.Vertical(*parts, row_shares=shares)
+    return rrb.Horizontal(left, right, column_shares=[2, 3], name="Diagnosis")
 
 
-def _log_structures(
-    stream: rr.RecordingStream, diagnosis: Diagnosis, motions: tuple[Motion, Motion]
-) -> list[rrb.View]:
-    """The structure as given and extended under the recorded forces, both enlarged alike."""
-    rigs = (diagnosis.nominal, diagnosis.extended)
-    highest = diagnosis.nominal.second_order().modes().frequency_hz
-    factor = min(
-        structure.magnification(rig, motion.position) for rig, motion in zip(rigs, motions, strict=True)
-    )
-    return [
-        _log_structure(stream, name, rig, motion, motion_frames(motion, highest), factor)
-        for name, rig, motion in zip(("nominal", "extended"), rigs, motions, strict=True)
+def _residual_tab(
+    stream: rr.RecordingStream, diagnosis: Diagnosis, recording: Recording, rows: list[int]
+) -> rrb.Container:
+    """A row per output: its residual over time, over frequency and over amplitude."""
+    kinds = [
+        log(stream, diagnosis, recording, rows)
+        for log in (log_over_time, log_over_frequency, log_over_amplitude)
     ]
+    columns = [rrb.Vertical(*views) for views in kinds if views]
+    return rrb.Horizontal(*columns, name="Residuals")
 
 
-def _log_structure(
-    stream: rr.RecordingStream, name: str, rig: Rig, motion: Motion, shown: np.ndarray, factor: float
-) -> rrb.View:
-    origin = f"/structure/{name}"
-    frames = structure.frames(rig, factor * motion.position[:, shown])
-    log_solids(stream, origin, rig, named=len(rig.bodies) <= MAX_NAMED)
-    log_frames(stream, origin, rig, frames, [rr.TimeColumn(TIMELINE, duration=motion.time[shown])])
-    return view(origin, f"{name}, motion × {factor:g}", rig, frames, aspect=1.0)
-
-
-def _summary(title: str, diagnosis: Diagnosis, recording: Recording) -> str:
+def _summary(title: str, diagnosis: Diagnosis, recording: Diagnosed) -> str:
     """Verdict, findings, errors and calibration in Markdown."""
     lines = [f"# {plain(title)}", "", plain(verdict_of(diagnosis, recording).sentence)]
+    if diagnosis.findings:
+        lines += ["", "## Findings", "", *_findings(diagnosis)]
     for name, table in (
-        ("Findings", finding_table(diagnosis)),
         ("Errors on data kept aside", error_table(diagnosis)),
         ("Calibration", calibration_table(diagnosis)),
     ):
@@ -205,6 +137,15 @@ def _summary(title: str, diagnosis: Diagnosis, recording: Recording) -> str:
             lines += [_row(row) for row in table.rows]
     lines += ["", *[f"- {plain(warning)}" for warning in diagnosis.warnings]]
     return "\n".join(lines)
+
+
+def _findings(diagnosis: Diagnosis) -> list[str]:
+    """One entry of a list each, since a table would be wider than its view."""
+    return [
+        f"1. {plain(cause)} at {plain(location)}: {plain(parameters)}; evidence {gain}; it removes {share} of the error "
+        "above the noise floor"
+        for cause, location, parameters, gain, share in finding_table(diagnosis).rows
+    ]
 
 
 def _row(cells: tuple[str, ...]) -> str:

@@ -7,7 +7,7 @@ import rerun as rr
 import rerun.blueprint as rrb
 
 from lab.diagnosis.restoring import Restoring
-from lab.show.drawing import SERIES, Axes, rgb, ticks
+from lab.show.drawing import SERIES, Axes, rgb, round_range
 from lab.show.rerun_log.plot import log_axes, plot_view
 
 ORIGIN = "/restoring"
@@ -19,7 +19,7 @@ def log_restoring(stream: rr.RecordingStream, restoring: Restoring) -> rrb.View:
     """Logs the points; one view."""
     x = np.concatenate([restoring.x, restoring.law_x])
     force = np.concatenate([restoring.force, restoring.law_force])
-    axes = Axes(_range(x), _range(force), 240.0, 130.0)
+    axes = Axes(round_range(x), round_range(force), 240.0, 130.0)
     log_axes(stream, ORIGIN, axes)
     ends = np.array([restoring.law_x.min(), restoring.law_x.max()])
     line = rr.LineStrips2D([axes.at(ends, restoring.linear * ends)], colors=rgb(SERIES[4]), radii=-1.0)
@@ -38,13 +38,3 @@ def log_restoring(stream: rr.RecordingStream, restoring: Restoring) -> rrb.View:
     stream.log(f"{ORIGIN}/legend", key, static=True)
     name = f"Force of {restoring.location} [N] over {AXIS[restoring.over]}"
     return plot_view(ORIGIN, name, axes, below=34.0)
-
-
-def _range(values: np.ndarray) -> tuple[float, float]:
-    """Smallest and largest value, widened to round ones."""
-    low, high = float(np.min(values)), float(np.max(values))
-    if not high > low:
-        return low - 0.5, low + 0.5
-    step = np.diff(ticks(low, high, 8))
-    size = float(step[0]) if step.size else high - low
-    return size * float(np.floor(low / size)), size * float(np.ceil(high / size))

@@ -62,6 +62,21 @@ def log_motion(
     ]
 
 
+def time_panel(frequency_hz: np.ndarray, end: float) -> rrb.TimePanel:
+    """The lowest mode swings about once in two seconds; the `end` seconds of moving pictures run in a loop."""
+    if end <= 0:
+        return rrb.TimePanel(state="collapsed", timeline=TIMELINE)
+    lowest = float(np.min(frequency_hz)) if frequency_hz.size else 0.5
+    return rrb.TimePanel(
+        state="collapsed",
+        timeline=TIMELINE,
+        playback_speed=float(f"{0.5 / lowest:.1g}") if lowest > 0 else 1.0,
+        loop_mode="selection",
+        time_selection=rrb.components.AbsoluteTimeRange(0, round(1e9 * end)),
+        play_state="playing",
+    )
+
+
 def view(origin: str, name: str, rig: Rig, frames: structure.Frames, *, aspect: float) -> rrb.View:
     """A 3D view from the front, a little from above, far enough to see all in a window of that aspect."""
     points = np.concatenate([frames.position.reshape(-1, 3), *[path.reshape(-1, 3) for path in frames.paths]])
@@ -97,20 +112,22 @@ def log_frames(
     rig: Rig,
     frames: structure.Frames,
     time: Sequence[rr.TimeColumn],
+    *,
+    limit: float | None = None,
 ) -> None:
-    """Logs where bodies are and how springs stretch, one row per frame."""
+    """Logs where bodies are and how springs stretch, one row per frame; `limit` is the extension in full colour."""
     for body, place, turn in zip(
         structure.moving_bodies(rig), frames.position, frames.quaternion, strict=True
     ):
         stream.send_columns(
             _body(origin, rig, body), time, rr.Transform3D.columns(translation=place, quaternion=turn)
         )
-    limit = float(np.max(np.abs(frames.extension), initial=0.0))
+    largest = float(np.max(np.abs(frames.extension), initial=0.0)) if limit is None else limit
     radius = 0.01 * structure.spacing(rig)
     for row, path, extension in zip(drawn_springs(rig), frames.paths, frames.extension, strict=True):
         entity = join(origin, "springs", rig.springs[row].name)
         stream.log(entity, rr.LineStrips3D.from_fields(radii=radius), static=True)
-        colors = diverging(extension, limit)
+        colors = diverging(extension, largest)
         stream.send_columns(entity, time, rr.LineStrips3D.columns(strips=path, colors=colors))
 
 

@@ -118,10 +118,21 @@ def log_levels(
     values: Mapping[str, np.ndarray],
     *,
     factor: float = 10.0,
+    size: tuple[float, float] = (440.0, 80.0),
 ) -> rrb.View:
-    """Logs powers of the measured signal and of models over frequency, in decibels; the view."""
+    """Logs powers of the measured signal and of models over frequency, in decibels; the view.
+
+    Args:
+        stream: where to.
+        origin: entity of the plot.
+        name: of the view.
+        frequency_hz: shape (n,).
+        values: by the name of a model or "measured", (n,) each.
+        factor: 10 for powers, 20 for magnitudes.
+        size: width and height on the canvas.
+    """
     levels = {model: decibels(value, factor=factor) for model, value in values.items()}
-    axes = Axes((0.0, float(frequency_hz[-1])), level_range(list(levels.values())), 440.0, 80.0)
+    axes = Axes((0.0, float(frequency_hz[-1])), level_range(list(levels.values())), *size)
     curves = [
         Curve(model, frequency_hz, level, COLORS[model], radius=1.5 if model == "measured" else 0.75)
         for model, level in levels.items()
