@@ -6,6 +6,9 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+
+from identification.recording import Array
 from lab import catalogue
 from lab.errors import LabError, RigError
 from lab.files.folder import output_folder
@@ -13,6 +16,7 @@ from lab.files.placement import save_placement
 from lab.placement.outcome import Placement
 from lab.placement.place import place
 from lab.placement.plan import Plan, usual_plan
+from lab.placement.shapes import normal_modes
 from lab.rig import Rig
 from lab.scenario import Scenario, load_scenario
 
@@ -50,7 +54,7 @@ def place_file(
     with output_folder(out, force=force) as folder:
         planned_test = None if scenario is None else load_scenario(scenario)
         rig = _rig(model, planned_test)
-        plan = _plan(rig, planned_test, dict(test or {}))
+        plan = _plan(_frequencies(rig, n_sensors, settings), planned_test, dict(test or {}))
         if planned_test is not None:
             settings = {**settings, "planned": _layout(planned_test)}
         placement = place(rig, n_sensors, plan=plan, **settings)
@@ -89,7 +93,14 @@ def _rig(model: str | Path | None, scenario: Scenario | None) -> Rig:
         raise RigError(f"{error} (in {path})") from None
 
 
-def _plan(rig: Rig, scenario: Scenario | None, test: dict[str, Any]) -> Plan:
+def _frequencies(rig: Rig, n_sensors: int, settings: Mapping[str, Any]) -> Array:
+    """Natural frequencies that the test must cover [Hz]: for modes, those asked for."""
+    if settings.get("target", "modes") == "modes":
+        return normal_modes(rig)[0][: settings.get("n_modes", n_sensors)] / (2 * np.pi)
+    return rig.second_order().modes().frequency_hz
+
+
+def _plan(frequency_hz: Array, scenario: Scenario | None, test: dict[str, Any]) -> Plan:
     """The test: that of the scenario, or one that suits the structure, with what is said differently."""
     given = {name: value for name, value in test.items() if value is not None}
     own: dict[str, Any] = {}
@@ -101,7 +112,7 @@ def _plan(rig: Rig, scenario: Scenario | None, test: dict[str, Any]) -> Plan:
         }
         if scenario.instruments.noise_percent:
             own["noise_percent"] = scenario.instruments.noise_percent
-    plan = usual_plan(rig.second_order().modes().frequency_hz, **{**own, **given})
+    plan = usual_plan(frequency_hz, **{**own, **given})
     if scenario is not None and "excitation" not in given and "level" not in given:
         plan = plan.driven(scenario.drive())
     return plan

@@ -20,7 +20,7 @@ def placement_summary(placement: Placement) -> str:
         _list("sensors", placement.sensors) + "\n" + _list("actuators", placement.actuators),
         "\n".join(_list(f"set-up {k + 1}", each) for k, each in enumerate(placement.setups)),
         _columns("layouts compared", ranking_table(placement, layouts=False)),
-        _columns("other signals, largest force the same or as told", drive_table(placement)),
+        _columns(_drive_title(placement), drive_table(placement)),
         _columns("causes most easily mistaken", Table(causes.heads, causes.rows[:MAX_CAUSES])),
         _inseparable(placement),
         "\n".join(_filled(f"warning: {each}") for each in placement.warnings),
@@ -32,10 +32,16 @@ def _list(name: str, members: tuple[str, ...]) -> str:
     return _filled(f"{name}: {', '.join(members)}") if members else ""
 
 
+def _drive_title(placement: Placement) -> str:
+    figure = f"; figure: {placement.drive_measure}" if placement.drive_measure else ""
+    return _filled(f"other signals, largest force the same or as told{figure}")
+
+
 def _inseparable(placement: Placement) -> str:
     groups = placement.inseparable
     if not groups:
-        return ""
+        alone = placement.target == "diagnosis"
+        return "told apart by no layout: none of the causes considered" if alone else ""
     told = "; ".join(" = ".join(group) for group in groups[:2])
     more = f"; and {len(groups) - 2} more groups in placement.json" if len(groups) > 2 else ""
     return _filled(f"told apart by no layout: {told}{more}")

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import replace
 
 import numpy as np
 
@@ -13,7 +14,9 @@ from lab.placement.choice import LIMIT, Choice, choose
 from lab.placement.criteria import CRITERIA, Criterion
 from lab.placement.independence import effective_independence, kinetic_energy
 from lab.placement.loading import added_mass, frequency_shifts
-from lab.placement.outcome import Placement, Ranked
+from lab.placement.modal_drives import MEASURE, modal_drives
+from lab.placement.outcome import Drive, Placement, Ranked
+from lab.placement.plan import Plan, usual_plan
 from lab.placement.search import count, greedy
 from lab.placement.shapes import choose_actuators, normal_modes, sensor_shapes
 from lab.rig import Rig
@@ -32,6 +35,7 @@ def place_modes(
     criterion: str = "d",
     n_modes: int | None = None,
     noise: Mapping[str, float] | None = None,
+    plan: Plan | None = None,
     setups: int = 1,
     references: int = 0,
     sensor_mass: float = 0.0,
@@ -47,6 +51,7 @@ def place_modes(
         criterion: "d", "a" or "e" for the information about modal coordinates, or "mac".
         n_modes: lowest modes asked for; as many as channels, or as there are, when None.
         noise: standard deviation by unit; equal for all sensors when None.
+        plan: the test for which signals are compared; a random one that suits the modes when None.
         setups: set-ups between which sensors rove.
         references: sensors that stay in every set-up.
         sensor_mass: of each sensor [kg].
@@ -102,6 +107,9 @@ def place_modes(
     shifts = _loading(rig, sensors, arranged, shapes, sensor_mass)
     possible = found.scores[np.isfinite(found.scores)]
     n_layouts = count(len(sensors), total, n_fixed=len(fixed))
+    drives = tuple(
+        _drives(rig, plan, sensors.channels_of(arranged[0]), actuators.channels_of(inputs), omega, noise)
+    )
     return Placement(
         "modes",
         rig.name,
@@ -116,10 +124,35 @@ def place_modes(
         len(possible) if found.proven else n_layouts,
         rule.figure(possible),
         tuple(ranking),
+        drives=drives,
+        drive_measure=MEASURE if drives else "",
         setups=tuple(sensors.named(each) for each in arranged) if setups > 1 else (),
         frequency_shifts=shifts,
-        warnings=tuple(_warnings(arranged, shifts, sensor_mass)),
+        warnings=(*_warnings(arranged, shifts, sensor_mass), *_unsaid(len(inputs), drives)),
     )
+
+
+def _drives(
+    rig: Rig,
+    plan: Plan | None,
+    outputs: Sequence[int],
+    inputs: Sequence[int],
+    omega: Array,
+    noise: Mapping[str, float] | None,
+) -> Iterator[Drive]:
+    """Signals compared where there are actuators; with roving sensors, in the first set-up."""
+    if inputs:
+        plan = plan or usual_plan(omega / (2 * np.pi))
+        yield from modal_drives(
+            rig, replace(plan, noise=noise) if noise else plan, outputs, inputs, len(omega)
+        )
+
+
+def _unsaid(n_actuators: int, drives: Sequence[Drive]) -> Iterator[str]:
+    if n_actuators and not drives:
+        yield (
+            "signals are not compared: modes, sensors and actuators have too many unknowns together; ask for fewer of them"
+        )
 
 
 def _require_references(n_sensors: int, setups: int, references: int) -> None:

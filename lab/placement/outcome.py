@@ -36,7 +36,7 @@ class Drive:
         excitation: kind of signal.
         duration: of all its records together [s].
         peak: largest force [N].
-        figure: value of the criterion with it.
+        figure: value of the criterion with it, or of the placement's `drive_measure`.
     """
 
     excitation: str
@@ -83,6 +83,7 @@ class Placement:
         figures: of every possible layout, rising; empty where they were not all compared.
         ranking: the best, the planned and the worst layouts, and those of other rules, with their figures.
         drives: other signals and levels for the layout chosen.
+        drive_measure: what their figures are, in words, where it is not `measure`; a share.
         causes: for the target "diagnosis", the causes of the catalogue.
         inseparable: groups of causes that no layout of these candidates tells apart.
         setups: sensors of each set-up where they rove, references first.
@@ -104,6 +105,7 @@ class Placement:
     figures: Array
     ranking: tuple[Ranked, ...]
     drives: tuple[Drive, ...] = ()
+    drive_measure: str = ""
     causes: tuple[CauseFigure, ...] = ()
     inseparable: tuple[tuple[str, ...], ...] = ()
     setups: tuple[tuple[str, ...], ...] = ()

@@ -47,7 +47,7 @@ def place(
         forbid: those that must not, with * and ? as wildcards.
         quantity: of the sensors: "acceleration", "velocity" or "displacement"; any when None.
         triaxial: the axes of a sensor are chosen together.
-        plan: the test that is planned; a random one that suits the structure when None. The target "modes" needs none.
+        plan: the test that is planned; a random one that suits the structure when None.
         noise: standard deviation by unit, such as {"m/s^2": 0.01}; as the plan says when None.
         planned: names of the sensors and actuators of a layout to be ranked too.
         settings: of the target: see `place_modes`, `place_matrices`, `place_diagnosis`.
@@ -68,7 +68,7 @@ def place(
         from lab.placement.modes import place_modes
 
         return place_modes(
-            rig, sensors, actuators, n_sensors, n_actuators, noise=noise, planned=other, **settings
+            rig, sensors, actuators, n_sensors, n_actuators, noise=noise, plan=plan, planned=other, **settings
         )
     # What cannot be chosen costs no work; in the same order, so that positions among the candidates stay.
     outputs = [rig.outputs[i].name for i in sorted(sensors.channels_of(range(len(sensors))))]

@@ -49,6 +49,7 @@ def write_placement_report(
         ranking=ranking,
         texts=(len(ranking.heads) - 2, len(ranking.heads) - 1),
         drives=drive_table(placement),
+        drive_measure=placement.drive_measure,
         shifts=_shift_table(placement),
         causes=Table(causes.heads, causes.rows[:MAX_CAUSES]),
         inseparable=placement.inseparable,

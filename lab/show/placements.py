@@ -85,10 +85,16 @@ def drive_table(placement: Placement) -> Table:
     return Table(
         ("Signal", "Duration [s]", "Largest force [N]", "Figure"),
         tuple(
-            (d.excitation, f"{d.duration:.4g}", f"{d.peak:.4g}", figure_text(placement, d.figure))
+            (d.excitation, f"{d.duration:.4g}", f"{d.peak:.4g}", _drive_figure(placement, d.figure))
             for d in placement.drives
         ),
     )
+
+
+def _drive_figure(placement: Placement, value: float) -> str:
+    if placement.drive_measure and math.isfinite(value):
+        return share(value)
+    return figure_text(placement, value)
 
 
 def cause_table(placement: Placement) -> Table:
