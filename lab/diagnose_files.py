@@ -1,24 +1,28 @@
-"""A recording file and a model file in, a folder with the diagnosis out."""
+"""A recording file, with samples or frequency responses, and a model file in, a folder with the diagnosis out."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from pathlib import Path
+from typing import Any
 
-from identification.recording import Recording
+from identification.response import FrequencyResponse
 from lab import catalogue
 from lab.diagnosis.calibrate import WIDTHS, parameters_of
 from lab.diagnosis.diagnose import Progress, diagnose
 from lab.diagnosis.outcome import Diagnosis
+from lab.diagnosis.spectral.diagnose import diagnose_spectra
 from lab.effects import EFFECTS
 from lab.effects.effect import Effect
-from lab.errors import LabError, RigError, UnknownNameError
+from lab.errors import FileError, LabError, RigError, UnknownNameError
 from lab.files.diagnosis import save_diagnosis
 from lab.files.folder import output_folder
 from lab.files.recording import load
+from lab.files.recording_responses import load_responses, only_responses
 from lab.matching import Names, matched, read_mapping, renamed, same_channels
 from lab.replay import Replay
 from lab.rig import Rig
+from lab.show.diagnosed import Diagnosed
 from lab.simulate import Motion, motion
 from lab.twin import twin
 
@@ -38,11 +42,11 @@ def diagnose_file(
     force: bool = False,
     command: str = "",
     progress: Progress | None = None,
-) -> tuple[Diagnosis, Recording]:
+) -> tuple[Diagnosis, Diagnosed]:
     """What a model gets wrong in a recording: found, written, shown.
 
     Args:
-        path: recording file.
+        path: recording file; where it holds no samples, its frequency responses are taken.
         model: model file, or a name from the catalogue of models.
         out: folder to come, with diagnosis.json, extended.xml, report.html and run.rrd.
         baseline: recording file of the same rig in its known state.
@@ -54,7 +58,7 @@ def diagnose_file(
         progress: told what is being done.
 
     Returns:
-        The diagnosis, and the recording with its channels as the model names them.
+        The diagnosis, and what it was found in, with channels as the model names them.
 
     Raises:
         UnknownNameError: a width or an effect is of nothing that exists.
@@ -62,10 +66,11 @@ def diagnose_file(
     """
     with output_folder(out, force=force) as folder:
         names = read_mapping(mapping) if isinstance(mapping, str | Path) else mapping or {}
-        recording = renamed(load(path), names)
+        recording = _named(path, names)
         rig = matched(_rig(model), recording)
-        known = None if baseline is None else same_channels(renamed(load(baseline), names), recording)
-        diagnosis = diagnose(
+        known = None if baseline is None else same_channels(_named(baseline, names), recording)
+        engine: Any = diagnose_spectra if isinstance(recording, FrequencyResponse) else diagnose
+        diagnosis = engine(
             recording,
             rig,
             baseline=known,
@@ -83,7 +88,7 @@ def diagnose_file(
 def present_diagnosis(
     folder: Path,
     diagnosis: Diagnosis,
-    recording: Recording,
+    recording: Diagnosed,
     *,
     command: str = "",
     facts: dict[str, str] | None = None,
@@ -105,6 +110,19 @@ def present_diagnosis(
     diagnosis.extended.save(folder / "extended.xml")
     write_diagnosis_report(folder / "report.html", diagnosis, recording, command=command, facts=facts)
     write_diagnosis_rrd(folder / "run.rrd", diagnosis, recording, motions=_first_swings(diagnosis, recording))
+
+
+def _named(path: str | Path, names: Names) -> Diagnosed:
+    """Samples, or else frequency responses, with channels as the model names them."""
+    if not only_responses(path):
+        return renamed(load(path), names)
+    responses = load_responses(path)
+    if not responses.dt > 0:
+        raise FileError(
+            f"{path}: holds responses to forces that vary continuously, as analysers measure them; expected those to "
+            "forces held over each sample, or samples; import the time signals instead"
+        )
+    return renamed(responses, names)
 
 
 def _rig(model: str | Path) -> Rig:
@@ -150,8 +168,10 @@ def _checksum(path: Path) -> str:
         return f", SHA-256 {hashlib.file_digest(file, 'sha256').hexdigest()}"
 
 
-def _first_swings(diagnosis: Diagnosis, recording: Recording) -> tuple[Motion, Motion] | None:
+def _first_swings(diagnosis: Diagnosis, recording: Diagnosed) -> tuple[Motion, Motion] | None:
     """The start of the first record in both models, long enough to watch; None where it cannot be had."""
+    if isinstance(recording, FrequencyResponse):
+        return None
     record = recording.records[0]
     if not record.inputs.shape[0]:
         return None

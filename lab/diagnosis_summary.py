@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import textwrap
 
-from identification.recording import Recording
 from lab.diagnosis.outcome import Diagnosis
+from lab.show.diagnosed import Diagnosed
 from lab.show.findings import Table, alternative_table, error_table, finding_table, verdict_of
 
 WIDTH = 100
@@ -15,7 +15,7 @@ MAX_CALIBRATED = 3
 MAX_UNLEARNABLE = 3
 
 
-def diagnosis_summary(diagnosis: Diagnosis, recording: Recording) -> str:
+def diagnosis_summary(diagnosis: Diagnosis, recording: Diagnosed) -> str:
     """Verdict, findings, alternatives, errors, calibration and warnings, as lines of text."""
     alternatives = alternative_table(diagnosis)
     short = Table(alternatives.heads[:4], tuple(row[:4] for row in alternatives.rows[:MAX_ALTERNATIVES]))

@@ -6,13 +6,15 @@ import tomllib
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
-from typing import Any
+from typing import Any, TypeVar
 
 from identification.recording import Channel, Recording
+from identification.response import FrequencyResponse
 from lab.errors import FileError, RigError, StudyError, UnknownNameError
 from lab.rig import Rig
 
 SIDES = ("inputs", "outputs")
+Measured = TypeVar("Measured", Recording, FrequencyResponse)
 Names = Mapping[str, Any]
 """New names by old ones; under "inputs" and "outputs", those of one side alone."""
 
@@ -39,11 +41,11 @@ def read_mapping(path: str | Path) -> dict[str, Any]:
     return {**_flat(document, path), **sided}
 
 
-def renamed(recording: Recording, names: Names) -> Recording:
+def renamed(recording: Measured, names: Names) -> Measured:
     """The recording with other names of channels.
 
     Args:
-        recording: as measured.
+        recording: as measured, samples or frequency responses.
         names: new names by old ones, as `read_mapping` gives them.
 
     Raises:
@@ -69,7 +71,7 @@ def renamed(recording: Recording, names: Names) -> Recording:
     return replace(recording, inputs=sides["inputs"], outputs=sides["outputs"])
 
 
-def matched(rig: Rig, recording: Recording) -> Rig:
+def matched(rig: Rig, recording: Recording | FrequencyResponse) -> Rig:
     """The rig with the channels of the recording connected, in their order.
 
     Raises:
@@ -97,18 +99,44 @@ def matched(rig: Rig, recording: Recording) -> Rig:
     )
 
 
-def same_channels(baseline: Recording, recording: Recording) -> Recording:
+def same_channels(
+    baseline: Recording | FrequencyResponse, recording: Recording | FrequencyResponse
+) -> Recording | FrequencyResponse:
     """The baseline with the channels of the recording alone, in their order.
 
     Raises:
         UnknownNameError: the baseline lacks one.
+        StudyError: one of both has samples and the other frequency responses.
     """
+    if isinstance(baseline, FrequencyResponse) != isinstance(recording, FrequencyResponse):
+        kinds = [
+            "frequency responses" if isinstance(each, FrequencyResponse) else "samples"
+            for each in (baseline, recording)
+        ]
+        raise StudyError(f"the baseline holds {kinds[0]} and the recording {kinds[1]}; expected both alike")
     for side in SIDES:
         wanted = {channel.name: channel for channel in getattr(recording, side)}
         _require(wanted, getattr(baseline, side), "the baseline", f"{side[:-1]} channel")
-    return baseline.select(
-        inputs=[channel.name for channel in recording.inputs],
-        outputs=[channel.name for channel in recording.outputs],
+    inputs = [channel.name for channel in recording.inputs]
+    outputs = [channel.name for channel in recording.outputs]
+    if isinstance(baseline, FrequencyResponse):
+        return _responses(baseline, inputs, outputs)
+    return baseline.select(inputs=inputs, outputs=outputs)
+
+
+def _responses(response: FrequencyResponse, inputs: list[str], outputs: list[str]) -> FrequencyResponse:
+    """The responses of these outputs to these inputs."""
+    columns, rows = (
+        [[channel.name for channel in known].index(name) for name in wanted]
+        for known, wanted in ((response.inputs, inputs), (response.outputs, outputs))
+    )
+    return replace(
+        response,
+        values=response.values[:, rows][:, :, columns],
+        inputs=tuple(response.inputs[k] for k in columns),
+        outputs=tuple(response.outputs[k] for k in rows),
+        coherence=None if response.coherence is None else response.coherence[:, rows],
+        variance=None if response.variance is None else response.variance[:, rows][:, :, columns],
     )
 
 

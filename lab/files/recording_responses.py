@@ -101,6 +101,17 @@ def has_responses(path: str | Path) -> bool:
             file.close()
 
 
+def only_responses(path: str | Path) -> bool:
+    """Whether a recording file holds frequency responses and no samples."""
+    with one_line(Path(path)):
+        file = open_file(Path(path))
+        try:
+            check_format(file)
+            return GROUP in file and "records" not in file
+        finally:
+            file.close()
+
+
 def _write(group: Any, response: FrequencyResponse) -> None:
     group.create_dataset("frequency", data=response.frequency_hz)
     group.create_dataset("values", data=response.values)

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from pathlib import Path
 
+from identification.recording import Recording
 from lab.diagnosis.outcome import Diagnosis
 from lab.diagnosis.restoring import restoring_force
 from lab.show.diagnosed import Diagnosed, about, title_of
@@ -42,7 +43,7 @@ def write_diagnosis_report(
         facts: further facts to reproduce the diagnosis, by name.
     """
     path = Path(path)
-    restoring = restoring_force(diagnosis, recording)
+    restoring = restoring_force(diagnosis, recording) if isinstance(recording, Recording) else None
     force = () if restoring is None else (restoring_figure(restoring),)
     own = {**surroundings(), **checksums(path.parent, BESIDE)}
     page = template("diagnosis.html.jinja").render(

@@ -10,13 +10,16 @@ import numpy as np
 import pytest
 
 from identification.recording import Recording
+from identification.response import FrequencyResponse
+from lab.catalogue import find
 from lab.diagnose_files import diagnose_file
 from lab.diagnosis.outcome import Diagnosis
 from lab.effects import EFFECTS
 from lab.errors import LabError
 from lab.files.diagnosis import load_diagnosis
 from lab.files.recording import save
-from lab.matching import renamed
+from lab.files.recording_responses import save_responses
+from lab.matching import renamed, same_channels
 from lab.rig import Rig
 from tests.lab.diagnosed import explained, recorded, two_masses
 from tests.lab.test_cli import complaint, status
@@ -226,3 +229,58 @@ def test_records_without_inputs_have_no_moving_picture(engine, bench):
     save(replace(recording, records=(silent,), inputs=()), "test.h5")
     diagnose_file("test.h5", "model.xml", "out")
     assert sorted(os.listdir("out")) == OUTPUTS
+
+
+def measured_responses(rig, seed):
+    """Responses to held forces, from the sampled state space, with complex noise of 1 % of their RMS."""
+    rng, f, dt = np.random.default_rng(seed), 0.05 * np.arange(1, 401), 0.02
+    system = rig.state_space().sampled(dt)
+    z = np.exp(2j * np.pi * f * dt)[:, None, None] * np.eye(system.A.shape[0])
+    B = np.broadcast_to(system.B, (f.size, *system.B.shape))
+    H = system.C @ np.linalg.solve(z - system.A, B) + system.D
+    level = 0.01 * np.sqrt(np.mean(np.abs(H) ** 2, axis=0) / 2)
+    H = H + level * (rng.standard_normal(H.shape) + 1j * rng.standard_normal(H.shape))
+    return FrequencyResponse(f, H, dt, rig.inputs, rig.outputs)
+
+
+def test_frequency_responses_are_diagnosed_from_files(tmp_path, monkeypatch, capsys):
+    monkeypatch.chdir(tmp_path)
+    rig = Rig.load(find("models", "chain7")).connected(
+        inputs=["force2"], outputs=["acc2.x", "acc5.x", "acc7.x"]
+    )
+    heavy = EFFECTS["mass_change"]("mass5", delta_mass=0.1).apply(rig)
+    save_responses(renamed(measured_responses(heavy, 1), {"acc7.x": "tip"}), "heavy.h5")
+    Path("names.toml").write_text('tip = "acc7.x"\n')
+    asked = ("diagnose", "heavy.h5", "--model", "chain7", "--map", "names.toml")
+    few = ("--effects", "mass_change,sensor_gain", "--out", "out")
+    assert status(*asked, *few) == 0
+    assert capsys.readouterr().out.startswith("Explained: Mass change at mass5")
+    (finding,) = load_diagnosis("out/diagnosis.json")["findings"]
+    mass = finding["parameters"]["delta_mass"]
+    # Four standard deviations: one chance in ten thousand.
+    assert abs(mass["value"] - 0.1) < 4 * mass["std"] < 0.05
+    page = Path("out/report.html").read_text("utf-8")
+    assert "the frequency responses of 3 outputs to 1 inputs, 400 lines from 0.05 to 20 Hz" in page
+    assert sorted(os.listdir("out")) == OUTPUTS
+    save(renamed(recorded(two_masses(), n_records=1), {"pos1": "tip"}), "samples.h5")
+    assert "holds samples and the recording frequency responses; expected both alike" in complaint(
+        capsys, *asked, "--baseline", "samples.h5", "--out", "again"
+    )
+    save_responses(replace(measured_responses(rig, 1), dt=0.0), "analyser.h5")
+    assert "import the time signals instead" in complaint(
+        capsys, "diagnose", "analyser.h5", "--model", "chain7"
+    )
+
+
+def test_a_baseline_of_responses_takes_the_channels_of_the_recording():
+    rig = Rig.load(find("models", "chain7")).connected(inputs=["force2"], outputs=["acc2.x", "acc5.x"])
+    known, turned = (
+        measured_responses(rig.connected(inputs=["force2", "force3"], outputs=outputs), 1)
+        for outputs in (["acc2.x", "acc5.x"], ["acc5.x", "acc7.x", "acc2.x"])
+    )
+    turned = replace(turned, coherence=np.abs(turned.values[:, :, 0]), variance=np.abs(turned.values))
+    taken = same_channels(turned, replace(known, values=known.values[:, :, 1:], inputs=known.inputs[1:]))
+    assert [channel.name for channel in (*taken.inputs, *taken.outputs)] == ["force3", "acc2.x", "acc5.x"]
+    np.testing.assert_array_equal(taken.values, turned.values[:, [2, 0], 1:])
+    np.testing.assert_array_equal(taken.variance, np.abs(taken.values))
+    np.testing.assert_array_equal(taken.coherence, np.abs(turned.values[:, [2, 0], 0]))
