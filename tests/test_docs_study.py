@@ -32,7 +32,7 @@ def test_the_commands_run_and_write_what_the_text_says(tmp_path, monkeypatch, ca
         assert (tmp_path / "out/noise" / name).is_file()
     (code,) = blocks(TEXT, "python")
     exec(code, {"__name__": "__main__"})
-    assert "{'instruments.noise_percent': 0.5, 'identification.method': 'era'} " in capsys.readouterr().out
+    assert "0.5 % noise, era: " in capsys.readouterr().out
 
 
 def test_the_study_file_shown_is_a_study(tmp_path):

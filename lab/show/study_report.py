@@ -8,7 +8,7 @@ from lab.show.figures.study import draw_study
 from lab.show.page import checksums, inline, surroundings, template
 from lab.show.verdict import Verdict
 from lab.studies.outcome import Outcome
-from lab.studies.wording import number, told, varied, words
+from lab.studies.wording import number, settings, told, varied, words
 
 BESIDE = ("study.h5",)
 """Files of the same folder that the report vouches for."""
@@ -57,7 +57,7 @@ def _rows(outcome: Outcome) -> list[list[str]]:
     study = outcome.study
     return [
         [
-            *(told(value) for value in study.setting(point).values()),
+            *(told(value) for value in settings(outcome, point)),
             *(number(each, point) for each in outcome.statistics),
         ]
         for point in range(min(study.n_points, MAX_ROWS))

@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import math
 import textwrap
+from collections.abc import Sequence
 from typing import Any
 
 from lab.studies.outcome import Outcome
@@ -53,6 +54,8 @@ SHARES = ("share", "coverage")
 WIDTH = 100
 SHOWN = 16
 """Points on one screen."""
+MAX_SHORT = 16
+"""Characters of a value on the screen."""
 
 
 def words(statistic: Statistic) -> str:
@@ -64,12 +67,20 @@ def told(value: Any) -> str:
     """A value of a setting in few characters."""
     if isinstance(value, str):
         return value
+    if isinstance(value, list) and value and all(isinstance(each, str) for each in value):
+        return ", ".join(value)
     return f"{value:.6g}" if isinstance(value, float) else json.dumps(value, ensure_ascii=False, default=str)
 
 
 def varied(outcome: Outcome) -> list[str]:
-    """Paths of the keys that vary."""
-    return [path for axis in outcome.study.axes for path in axis.paths]
+    """Paths of the keys that vary; one that has the same value in every run does not."""
+    return [path for axis in outcome.study.axes if len(axis) > 1 for path in axis.paths]
+
+
+def settings(outcome: Outcome, point: int) -> list[Any]:
+    """The values at a point of the keys that vary."""
+    setting = outcome.study.setting(point)
+    return [setting[path] for path in varied(outcome)]
 
 
 def number(statistic: Statistic, point: int) -> str:
@@ -113,18 +124,35 @@ def _table(title: str, kinds: tuple[str, ...], outcome: Outcome) -> str:
         SHORT.get(each.name, words(each)) for each in chosen
     ]
     rows = [heads]
-    for point in range(min(outcome.study.n_points, SHOWN)):
-        setting = [_short(value) for value in outcome.study.setting(point).values()]
-        rows.append(setting + [_value(each, point) for each in chosen])
+    points = range(min(outcome.study.n_points, SHOWN))
+    columns = zip(*(settings(outcome, point) for point in points), strict=True)
+    short = list(zip(*map(_shortened, columns), strict=True)) or [()] * len(points)
+    for point in points:
+        rows.append([*short[point], *(_value(each, point) for each in chosen)])
     widths = [max(map(len, column)) for column in zip(*rows, strict=True)]
     lines = ["  ".join(f"{cell:>{width}}" for cell, width in zip(row, widths, strict=True)) for row in rows]
     return "\n".join([title, *lines])
 
 
+def _shortened(column: Sequence[Any]) -> list[str]:
+    """Values of a setting in few characters; numbered where that leaves different ones alike."""
+    there = list(dict.fromkeys(map(told, column)))
+    short = [_short(value) for value in column]
+    if len(set(short)) == len(there):
+        return short
+    return [_cut(f"{there.index(told(value)) + 1}) {told(value)}") for value in column]
+
+
 def _short(value: Any) -> str:
-    """A value of a setting, cut where it is long."""
+    """A value of a setting, cut where it is long; of a list, how many it has comes first."""
     text = told(value)
-    return text if len(text) <= 16 else f"{text[:15]}…"
+    if isinstance(value, list) and len(text) > MAX_SHORT:
+        text = f"{len(value)}: {text}"
+    return _cut(text)
+
+
+def _cut(text: str) -> str:
+    return text if len(text) <= MAX_SHORT else f"{text[: MAX_SHORT - 1]}…"
 
 
 def _value(statistic: Statistic, point: int) -> str:
