@@ -28,6 +28,31 @@ class Criterion:
     passed: bool
 
 
+@dataclass(frozen=True)
+class Validation:
+    """One criterion of the field and how it came out.
+
+    Attributes:
+        name: what is held against the model.
+        limit: the bound.
+        at_least: whether the value must reach the bound, not stay within it.
+        value: what was reached; None when it could not be had.
+        std: one standard deviation of the value; None where it is not known.
+        outcome: "pass", "fail" or "undecided".
+        where: the mode that decides, and on how many points.
+        source: who uses the criterion.
+    """
+
+    name: str
+    limit: float
+    at_least: bool
+    value: float | None
+    std: float | None
+    outcome: str
+    where: str
+    source: str
+
+
 @dataclass(frozen=True, eq=False)
 class Result:
     """Everything that `result.json` and the report tell of one identification.
@@ -44,6 +69,7 @@ class Result:
         truth_second_order: its M, C, K, or None.
         comparison: estimate against truth, or None.
         criteria: requirements of the scenario.
+        validation: criteria of the field, where there is a truth.
         warnings: what a careful reader should know, one sentence each.
         notes: what the method chose by itself and why, one sentence each.
         explanation: one paragraph on method, order and horizon, modes kept and poles rejected.
@@ -61,6 +87,7 @@ class Result:
     truth_second_order: SecondOrder | None = None
     comparison: Comparison | None = None
     criteria: tuple[Criterion, ...] = ()
+    validation: tuple[Validation, ...] = ()
     warnings: tuple[str, ...] = ()
     notes: tuple[str, ...] = ()
     explanation: str = ""

@@ -24,6 +24,7 @@ from lab.result import Result
 from lab.rig import Rig
 from lab.scenario import Scenario, load_scenario
 from lab.simulate import simulate_to_file
+from lab.validation import validate
 
 Progress = Callable[..., None]
 """Called with the number of samples simulated since the last call, and `total`, how many there are in all."""
@@ -59,6 +60,7 @@ def run(
         chosen = scenario.identification
         result = examine(recording, chosen.method, order=chosen.order, dofs=touched(rig), **chosen.settings)
         result = replace(held_against(truth_of(scenario, rig), result, scenario), title=scenario.title)
+        result = _validated(result, recording, scenario)
         if scenario.diagnosis is not None:
             result = _diagnosed(folder / "diagnosis", result, recording, scenario, command)
         present(folder, result, recording, scenario=scenario, rig=rig, command=command)
@@ -183,6 +185,14 @@ def held_against(rig: Rig, result: Result, scenario: Scenario) -> Result:
         comparison=comparison,
         criteria=judge(scenario.criteria.model_dump(), comparison),
     )
+
+
+def _validated(result: Result, recording: Recording, scenario: Scenario) -> Result:
+    """The result with the criteria of the field judged."""
+    told = recording.attributes.get("simulation_error", 0.0)
+    numerical = 0.0 if isinstance(told, str) else float(told)
+    limits = scenario.validation.limits()
+    return replace(result, validation=validate(result, limits, numerical_error=numerical))
 
 
 def _diagnosed(

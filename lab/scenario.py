@@ -26,6 +26,7 @@ from lab.effects import EFFECTS
 from lab.effects.effect import Effect
 from lab.errors import FileError, StudyError
 from lab.excitation import EXCITATIONS, Excitation
+from lab.validation import Limits
 
 Fraction = Annotated[float, Field(ge=0, le=1)]
 Bound = Annotated[float, Field(ge=0)]
@@ -126,6 +127,26 @@ class Criteria(Table):
     stiffness_error: Bound | None = None
 
 
+class Validating(Table):
+    """Limits of the criteria of the field, which the report judges whatever the scenario requires.
+
+    Attributes:
+        first_frequency_error, frequency_error: largest relative error of the lowest mode, and of the others.
+        mac: smallest modal assurance criterion of a pair of modes.
+        cross_orthogonality, cross_orthogonality_off: smallest entry of a mode with its partner, largest with another.
+    """
+
+    first_frequency_error: Bound = Limits.first_frequency_error
+    frequency_error: Bound = Limits.frequency_error
+    mac: Fraction = Limits.mac
+    cross_orthogonality: Fraction = Limits.cross_orthogonality
+    cross_orthogonality_off: Fraction = Limits.cross_orthogonality_off
+
+    def limits(self) -> Limits:
+        """The same as the judge takes them."""
+        return Limits(**self.model_dump())
+
+
 class Scenario(Table):
     """A whole virtual test.
 
@@ -142,6 +163,7 @@ class Scenario(Table):
         identification: how the recording is identified.
         diagnosis: what a diagnosis of the recording must find; none is made when left out.
         criteria: what the test must reach.
+        validation: limits of the criteria of the field.
     """
 
     title: str
@@ -155,6 +177,7 @@ class Scenario(Table):
     identification: Identification = Identification()
     diagnosis: Diagnosing | None = None
     criteria: Criteria = Criteria()
+    validation: Validating = Validating()
     _folder: Path = PrivateAttr(default=Path())
     _text: str = PrivateAttr(default="")
 

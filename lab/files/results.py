@@ -47,6 +47,7 @@ def result_document(result: Result) -> dict[str, Any]:
         "truth": truth,
         "comparison": None if result.comparison is None else asdict(result.comparison),
         "criteria": [asdict(criterion) for criterion in result.criteria],
+        "validation": [asdict(each) for each in result.validation],
         "warnings": list(result.warnings),
         "notes": list(result.notes),
         "explanation": result.explanation,

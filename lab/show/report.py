@@ -12,7 +12,15 @@ from lab.result import Result
 from lab.show.figures import draw, matrix_maps
 from lab.show.page import checksums, inline, surroundings, template
 from lab.show.signals import measured_inputs
-from lab.show.tables import MAX_PRINTED, criteria_rows, matrix_summary, matrix_tables, modes_table, same_dofs
+from lab.show.tables import (
+    MAX_PRINTED,
+    criteria_rows,
+    matrix_summary,
+    matrix_tables,
+    modes_table,
+    same_dofs,
+    validation_rows,
+)
 from lab.show.verdict import verdict
 
 BESIDE = ("recording.h5", "result.json")
@@ -44,6 +52,8 @@ def write_report(
         about=_about(result, recording),
         verdict=verdict(result),
         criteria=criteria_rows(result),
+        validation=validation_rows(result),
+        compared=_compared(result),
         modes=modes_table(result),
         **_matrices(result),
         figures=[inline(drawing) for drawing in draw(result, recording)],
@@ -65,6 +75,14 @@ def _about(result: Result, recording: Recording) -> str:
         f"with {len(measured_inputs(recording))} inputs and {len(recording.outputs)} outputs, "
         f"{recording.duration:g} s at {recording.sample_rate:g} Hz."
     )
+
+
+def _compared(result: Result) -> str:
+    """How many modes the validation rests on."""
+    if result.comparison is None:
+        return ""
+    n = len(result.comparison.pairs)
+    return f"{n} of {n + len(result.comparison.missed)} modes of the model were found and are compared."
 
 
 def _matrices(result: Result) -> dict[str, Any]:

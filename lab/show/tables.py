@@ -9,8 +9,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from identification.systems import SecondOrder
-from lab.result import Criterion, Result
-from lab.show.verdict import bound, lowered, mode_rows, words
+from lab.result import Criterion, Result, Validation
+from lab.show.verdict import bound, lowered, mode_rows, percent, words
 
 MAX_PRINTED = 12
 """Matrices up to this size are printed, larger ones drawn."""
@@ -63,6 +63,41 @@ def criteria_rows(result: Result) -> list[CriterionRow]:
         )
         for criterion in result.criteria
     ]
+
+
+@dataclass(frozen=True)
+class ValidationRow:
+    """One criterion of the field in words."""
+
+    name: str
+    bound: str
+    value: str
+    outcome: str
+    where: str
+    source: str
+
+
+def validation_rows(result: Result) -> list[ValidationRow]:
+    """Every criterion of the field with what was reached and how it came out."""
+    return [
+        ValidationRow(
+            each.name,
+            f"{'≥' if each.at_least else '≤'} {_quantity(each, each.limit)}",
+            "not available" if each.value is None else _quantity(each, each.value, each.std),
+            each.outcome if each.outcome != "fail" else "FAIL",
+            each.where,
+            each.source,
+        )
+        for each in result.validation
+    ]
+
+
+def _quantity(each: Validation, value: float, std: float | None = None) -> str:
+    """Errors in percent, all else as numbers; what must reach a bound is never rounded up to it."""
+    if "error of" in each.name:
+        bar = "" if std is None or not std > 0 else f" ± {percent(std)}"
+        return f"{percent(value)}{bar}"
+    return lowered(value) if each.at_least and value != each.limit else f"{value:.3g}"
 
 
 def _reached(criterion: Criterion) -> str:

@@ -51,9 +51,9 @@ class ModeRow:
 
 
 def verdict(result: Result) -> Verdict:
-    """The outcome of the scenario's criteria, else how well the truth was met, else what was found."""
+    """The outcome of the scenario's criteria, else of those of the field, else what was found."""
     if not result.criteria:
-        return Verdict(FOUND, _found(result))
+        return _of_the_field(result) if result.validation else Verdict(FOUND, _found(result))
     n, missed = len(result.criteria), [criterion for criterion in result.criteria if not criterion.passed]
     if missed:
         reasons = "; ".join(_shortfall(criterion) for criterion in missed)
@@ -62,6 +62,21 @@ def verdict(result: Result) -> Verdict:
         )
     met = {1: "the criterion is met", 2: "both criteria are met"}.get(n, f"all {n} criteria are met")
     return Verdict(PASSED, f"Passed: {met}. {_found(result)}")
+
+
+def _of_the_field(result: Result) -> Verdict:
+    """The outcome of the criteria of the field: failed by one, undecided by one, or passed by all."""
+    outcomes = [each.outcome for each in result.validation]
+    named = {
+        kind: ", ".join(each.name for each in result.validation if each.outcome == kind)
+        for kind in ("fail", "undecided")
+    }
+    if "fail" in outcomes:
+        return Verdict(FAILED, f"Failed by the criteria of the field: {named['fail']}. {_found(result)}")
+    if "undecided" in outcomes:
+        text = f"Undecided by the criteria of the field: {named['undecided']}. {_found(result)}"
+        return Verdict(FOUND, text)
+    return Verdict(PASSED, f"Passed: all criteria of the field are met. {_found(result)}")
 
 
 def bound(criterion: Criterion) -> str:

@@ -15,8 +15,10 @@ import pytest
 from identification.recording import Channel, Record, Recording
 from lab.show.figures import draw
 from lab.show.figures.canvas import plain, power_of_ten
-from lab.show.figures.signals import chosen_pairs
+from lab.show.figures.responses import chosen_pairs
 from lab.show.report import write_report
+from lab.show.verdict import verdict
+from lab.validation import validate
 from tests.lab.showcase import chain_result, chain_rig, pulse_recording, random_recording
 
 EVIL = '<script>alert(1)</script> & "$x$" \x00'
@@ -216,16 +218,24 @@ def test_figures_of_a_random_test(rig):
         "time",
         "spectra",
         "frf",
+        "nyquist",
+        "coherence",
         "shapes",
+        "error-bars",
         "stabilization",
         "mac",
         "singular",
     ]
-    response = drawings[2]
+    named = {d.name: d for d in drawings}
+    response = named["frf"]
     assert "driving" not in response.caption  # all four of two inputs and two outputs are shown
     assert "identified" in response.svg
     rejected = set(chain_result(rig).stabilization.label) - {"stable"}
-    assert all(reason in drawings[4].svg for reason in rejected)
+    assert all(reason in named["stabilization"].svg for reason in rejected)
+    assert "dB re 1 m/s² / N" in response.svg
+    assert "dB re 1 (m/s²)²/Hz" in named["spectra"].svg
+    assert "imaginary part" in named["nyquist"].svg
+    assert "the truth: about 95 %" in named["error-bars"].caption
 
 
 def test_driving_points_come_first():
@@ -276,3 +286,25 @@ def test_a_browser_opens_and_prints_it(page, tmp_path):
     )
     assert printed.read_bytes().startswith(b"%PDF-")
     assert printed.stat().st_size > 20_000
+
+
+def test_the_criteria_of_the_field_stand_in_a_table_with_their_sources(rig, tmp_path):
+    result = chain_result(rig)
+    judged = replace(result, criteria=(), validation=validate(result))
+    write_report(tmp_path / "report.html", judged, pulse_recording(rig))
+    text = (tmp_path / "report.html").read_text(encoding="utf-8")
+    assert 'class="verdict passed">Passed: all criteria of the field are met.' in text
+    visible = " ".join("".join(Page(text).text).split())
+    assert "3 of 3 modes of the model were found" in visible
+    assert "NASA-STD-5002, ECSS-E-ST-32-11C" in visible
+    names = [each.name for each in judged.validation]
+    assert all(f'<th scope="row" class="wrap">{name}</th>' in text for name in names)
+    broken = replace(
+        judged, validation=(replace(judged.validation[0], outcome="fail"), *judged.validation[1:])
+    )
+    assert verdict(broken).sentence.startswith(f"Failed by the criteria of the field: {names[0]}. 3 of 3")
+    open_ = replace(
+        judged, validation=(replace(judged.validation[0], outcome="undecided"), *judged.validation[1:])
+    )
+    assert verdict(open_).outcome == "found"
+    assert verdict(open_).sentence.startswith("Undecided by the criteria of the field")

@@ -151,6 +151,17 @@ def logarithmic(axes: Axes) -> None:
     axes.yaxis.set_minor_formatter(FuncFormatter(lambda value, place: ""))
 
 
+def decibel_axis(axes: Axes, label: str, *, factor: float) -> None:
+    """A second scale on the right of a logarithmic axis whose limits stand: factor 10 for powers, 20 for magnitudes."""
+    right = axes.twinx()
+    low, high = axes.get_ylim()
+    right.set_ylim(factor * np.log10(low), factor * np.log10(high))
+    right.spines["right"].set_visible(True)
+    right.yaxis.set_major_locator(MaxNLocator(5, steps=[1, 2, 5, 10]))
+    right.yaxis.set_major_formatter(FuncFormatter(lambda value, place: f"{value:g}"))
+    right.set_ylabel(label)
+
+
 def few_ticks(axes: Axes, n: int) -> None:
     """About `n` round ticks on a linear y axis."""
     axes.yaxis.set_major_locator(MaxNLocator(n))

@@ -1,28 +1,30 @@
-"""Figures of the measured signals: time histories, spectra, frequency responses."""
+"""Figures of the measured signals: time histories and spectra."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import Any
 
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from identification.recording import Channel, Recording
-from identification.systems import StateSpace
 from lab.result import Result
 from lab.show.drawing import SERIES
-from lab.show.figures.canvas import DASHES, Drawing, drawing, few_ticks, logarithmic, mark_modes, plain
-from lab.show.signals import Spectra, envelope, frequency_response, measured_inputs, upper_frequency
+from lab.show.figures.canvas import (
+    DASHES,
+    Drawing,
+    decibel_axis,
+    drawing,
+    few_ticks,
+    logarithmic,
+    mark_modes,
+    plain,
+)
+from lab.show.signals import Spectra, envelope, measured_inputs, upper_frequency
 
 MAX_INPUTS, MAX_OUTPUTS = 4, 8
 """Time histories shown."""
-MAX_RESPONSES = 4
-"""Frequency responses shown."""
-Look = dict[str, Any]
-MEASURED: Look = {"color": "0.6", "linewidth": 2.0}
-IDENTIFIED: Look = {"color": SERIES[0], "linestyle": (0, (4, 2)), "linewidth": 1.0}
 FEW_LINES = 60
 """Spectra of up to so many lines show each of them."""
 MAX_LINES = 6
@@ -49,7 +51,7 @@ def time_histories(recording: Recording) -> Drawing:
                 if start:
                     axes.axvline(start, color="0.5", linestyle=":", linewidth=0.8)
             axes.set_ylabel(
-                f"{plain(channel.name, 16)}\n[{_upright(channel.unit)}]", rotation=0, ha="right", va="center"
+                f"{plain(channel.name, 16)}\n[{upright(channel.unit)}]", rotation=0, ha="right", va="center"
             )
             few_ticks(axes, 2)
         frames[-1].set_xlabel("time [s]")
@@ -95,8 +97,10 @@ def output_spectra(recording: Recording, spectrum: Spectra, result: Result) -> D
             names = [recording.outputs[row].name for row in rows]
             _densities(axes, spectrum.frequency_hz[shown], spectrum.output_density[rows][:, shown], names)
             axes.set_xlim(0, top)
-            axes.set_ylabel(f"[({_upright(unit)})²/Hz]")
+            axes.set_ylabel(f"[({upright(unit)})²/Hz]")
             mark_modes(axes, result.modes.frequency_hz, numbered=number == 0)
+            if axes.get_yscale() == "log":
+                decibel_axis(axes, f"dB re 1 ({upright(unit)})²/Hz", factor=10.0)
         frames[-1].set_xlabel("frequency [Hz]")
 
     window = "whole records" if spectrum.window == "none" else "Hann windows"
@@ -116,7 +120,7 @@ def _densities(axes: Axes, frequency: np.ndarray, density: np.ndarray, names: Se
             marker = "." if frequency.size <= FEW_LINES else ""
             look = {"color": SERIES[i], "linestyle": DASHES[i], "marker": marker}
             axes.plot(frequency, positive[i], label=plain(name, 20), **look)
-        axes.legend(loc="center left", bbox_to_anchor=(1.0, 0.5))
+        axes.legend(loc="best")
     else:
         axes.plot(frequency, positive.T, color="0.7", linewidth=0.5)
         axes.plot(frequency, np.mean(density, axis=0), color="black")
@@ -124,88 +128,6 @@ def _densities(axes: Axes, frequency: np.ndarray, density: np.ndarray, names: Se
         logarithmic(axes)
 
 
-def responses(recording: Recording, spectrum: Spectra, result: Result) -> Drawing | None:
-    """Magnitude and phase of a few responses, measured and of the identified model; None without inputs."""
-    measured = frequency_response(spectrum)
-    if measured is None:
-        return None
-    pairs = chosen_pairs(recording.inputs, recording.outputs)
-    top = upper_frequency(recording.sample_rate, result.modes.frequency_hz)
-    shown = (spectrum.frequency_hz <= top) & (spectrum.frequency_hz > 0)
-    frequency = spectrum.frequency_hz[shown]
-    system, fine = result.realization.system, np.linspace(frequency[0], frequency[-1], 400)
-    n_columns = min(2, len(pairs))
-    n_rows = -(-len(pairs) // n_columns)
-
-    def paint(figure: Figure) -> None:
-        heights = [2.2, 1.0] * n_rows
-        frames = figure.subplots(2 * n_rows, n_columns, sharex=True, squeeze=False, height_ratios=heights)
-        for number, (i, j) in enumerate(pairs):
-            upper, lower = frames[
-                2 * (number // n_columns) : 2 * (number // n_columns) + 2, number % n_columns
-            ]
-            _response(upper, lower, frequency, measured[shown, i, j], "measured", MEASURED)
-            model = _model_response(system, recording.outputs[i], recording.inputs[j], fine)
-            if model is not None:
-                _response(upper, lower, fine, model, "identified", IDENTIFIED)
-            logarithmic(upper)
-            unit = f"{_upright(recording.outputs[i].unit)} / {_upright(recording.inputs[j].unit)}"
-            upper.set_title(f"{plain(recording.outputs[i].name, 20)} / {plain(recording.inputs[j].name, 20)}")
-            upper.set_ylabel(f"[{unit}]")
-            lower.set_ylabel("phase [°]")
-            lower.set_ylim(-190, 190)
-            lower.set_yticks([-180, 0, 180])
-            upper.set_xlim(0, top)
-        for axes in frames[
-            2 * ((len(pairs) - 1) // n_columns) :: 2, len(pairs) % n_columns or n_columns :
-        ].ravel():
-            axes.set_visible(False)
-        for axes in frames[-1]:
-            axes.set_xlabel("frequency [Hz]")
-        frames[0, 0].legend(loc="best")
-
-    total = len(recording.inputs) * len(recording.outputs)
-    caption = "Frequency responses (H1), magnitude and phase: grey measured, dashed the identified model."
-    if spectrum.window == "none" and spectrum.remainder > 0.01:
-        caption += " The records end before the motion has died down, which blunts the measured peaks."
-    if total > len(pairs):
-        caption += f" {len(pairs)} of {total} shown, driving points first."
-    return drawing("frf", 0.3 + 2.7 * n_rows, caption, paint)
-
-
-def chosen_pairs(inputs: Sequence[Channel], outputs: Sequence[Channel]) -> list[tuple[int, int]]:
-    """Positions (output, input) of the responses to show: driving points first, then others of each input."""
-    everything = [(i, j) for i in range(len(outputs)) for j in range(len(inputs))]
-
-    def rank(pair: tuple[int, int]) -> tuple[bool, int, int]:
-        i, j = pair
-        driving = bool(outputs[i].dof) and outputs[i].dof == inputs[j].dof
-        return (not driving, (i - j) % len(outputs), j)
-
-    return sorted(sorted(everything, key=rank)[:MAX_RESPONSES], key=lambda pair: (pair[1], pair[0]))
-
-
-def _model_response(
-    system: StateSpace, output: Channel, drive: Channel, frequency: np.ndarray
-) -> np.ndarray | None:
-    """Of the identified model, from one input to one output; None when it has no such input."""
-    names_in, names_out = ([c.name for c in channels] for channels in (system.inputs, system.outputs))
-    if drive.name not in names_in or output.name not in names_out:
-        return None
-    i, j = names_out.index(output.name), names_in.index(drive.name)
-    return np.asarray(system.frequency_response(frequency)[:, i, j])
-
-
-def _response(upper: Axes, lower: Axes, frequency: np.ndarray, H: np.ndarray, label: str, look: Look) -> None:
-    if frequency.size <= FEW_LINES:
-        look = {**look, "marker": ".", "linestyle": ""}
-    upper.plot(frequency, np.where(np.abs(H) > 0, np.abs(H), np.nan), label=label, **look)
-    phase = np.degrees(np.angle(H))
-    # A jump from -180 to 180 is no motion: break the line there.
-    cut = np.flatnonzero(np.abs(np.diff(phase)) > 180) + 1
-    lower.plot(np.insert(frequency, cut, np.nan), np.insert(phase, cut, np.nan), **look)
-
-
-def _upright(unit: str) -> str:
+def upright(unit: str) -> str:
     """The unit as printed: m/s² for m/s^2."""
     return unit.replace("^2", "²")
