@@ -7,16 +7,16 @@ from pathlib import Path
 from typing import Any
 
 from identification.response import FrequencyResponse
-from lab import catalogue
 from lab.diagnosis.calibrate import WIDTHS, parameters_of
 from lab.diagnosis.diagnose import Progress, diagnose
 from lab.diagnosis.outcome import Diagnosis
 from lab.diagnosis.spectral.diagnose import diagnose_spectra
 from lab.effects import EFFECTS
 from lab.effects.effect import Effect
-from lab.errors import FileError, LabError, RigError, UnknownNameError
+from lab.errors import FileError, LabError, UnknownNameError
 from lab.files.diagnosis import save_diagnosis
 from lab.files.folder import output_folder
+from lab.files.model import load_model
 from lab.files.recording import load
 from lab.files.recording_responses import load_responses, only_responses
 from lab.matching import Names, matched, read_mapping, renamed, same_channels
@@ -67,7 +67,7 @@ def diagnose_file(
     with output_folder(out, force=force) as folder:
         names = read_mapping(mapping) if isinstance(mapping, str | Path) else mapping or {}
         recording = _named(path, names)
-        rig = matched(_rig(model), recording)
+        rig = matched(load_model(model), recording)
         known = None if baseline is None else same_channels(_named(baseline, names), recording)
         engine: Any = diagnose_spectra if isinstance(recording, FrequencyResponse) else diagnose
         diagnosis = engine(
@@ -123,14 +123,6 @@ def _named(path: str | Path, names: Names) -> Diagnosed:
             "forces held over each sample, or samples; import the time signals instead"
         )
     return renamed(responses, names)
-
-
-def _rig(model: str | Path) -> Rig:
-    path = Path(model) if Path(model).exists() else catalogue.find("models", str(model))
-    try:
-        return Rig.load(path)
-    except RigError as error:
-        raise RigError(f"{error} (in {path})") from None
 
 
 def _widths(given: Mapping[str, float], rig: Rig) -> Mapping[str, float]:

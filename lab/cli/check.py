@@ -23,23 +23,18 @@ from lab.cli.shared import FILE, example, json_option, map_option, model_option,
 @click.option("--quiet", is_flag=True, help="Print faults alone.")
 def command(recording: Path, model: str | None, mapping: Path | None, as_json: bool, quiet: bool) -> None:
     """What to know about a recording before any analysis: dead, clipped, swapped channels and the like."""
-    from lab import catalogue
     from lab.checks import check
     from lab.checks.screen import document, screen
+    from lab.files.model import load_model
     from lab.files.recording import load
     from lab.matching import read_mapping, renamed
-    from lab.rig import Rig
 
     with Doing(quiet) as doing:
         doing("reading")
         data = load(recording)
         if mapping is not None:
             data = renamed(data, read_mapping(mapping))
-        rig = (
-            None
-            if model is None
-            else Rig.load(model if Path(model).exists() else catalogue.find("models", model))
-        )
+        rig = None if model is None else load_model(model)
         doing("checking")
         remarks = check(data, rig)
     if as_json:
