@@ -11,6 +11,7 @@ import click
 from lab.cli.completion import names_of
 from lab.cli.progress import Doing
 from lab.cli.shared import (
+    FILE,
     example,
     model_option,
     named,
@@ -22,10 +23,22 @@ from lab.cli.shared import (
 )
 
 
+def _asked(context: click.Context, _: click.Parameter, path: Path | None) -> Path | None:
+    """Takes from a placement file what the command line leaves open."""
+    if path is not None:
+        from lab.placement.file import load_placement_file
+
+        context.default_map = load_placement_file(path)
+    return path
+
+
 @click.command(
     "place",
     short_help="Where sensors and actuators should go.",
     epilog=example("lab place --model models/truss.xml --sensors 5 --actuators 4 --target matrices"),
+)
+@click.argument(
+    "placement_file", metavar="[PLACEMENT.toml]", required=False, type=FILE, is_eager=True, callback=_asked
 )
 @model_option("The structure in MJCF, with all candidates in it.")
 @click.option(
@@ -114,6 +127,7 @@ from lab.cli.shared import (
 @seed_option("Seed of the random forces of the planned test.")
 @output_options("out/MODEL_placement")
 def command(
+    placement_file: Path | None,
     model: str | None,
     n_sensors: int,
     n_actuators: int,
@@ -126,7 +140,10 @@ def command(
     noise: tuple[str, ...],
     **options: Any,
 ) -> None:
-    """Where sensors and actuators should go, and what each choice costs."""
+    """Where sensors and actuators should go, and what each choice costs.
+
+    A placement file may ask all that the options can; options given beside it win.
+    """
     from lab.files.placement import placement_document
     from lab.place_files import place_file
     from lab.placement_summary import placement_summary
@@ -153,7 +170,8 @@ def command(
     if foreign:
         name = {"n_modes": "modes", "causes": "effects"}.get(foreign[0], foreign[0]).replace("_", "-")
         raise click.UsageError(f"--{name} means nothing for the target {target}.")
-    folder = out or Path("out") / f"{Path(model or scenario or 'model').stem}_placement"
+    asked = placement_file or Path(model or scenario or "model")
+    folder = out or Path("out") / f"{asked.stem}_placement"
     with Doing(quiet) as progress:
         progress("placing")
         placement, _ = place_file(
