@@ -50,6 +50,9 @@ class Path:
         return whole, part if part > 1e-9 else 0.0
 
 
+PLAIN = Path()
+
+
 def pushed(paths: Sequence[Path], inputs: Array, dt: float) -> list[Array]:
     """Forces that the actuators make of recorded inputs (n_inputs, n_samples), held over each sample.
 
@@ -61,7 +64,7 @@ def pushed(paths: Sequence[Path], inputs: Array, dt: float) -> list[Array]:
         if path.held_lag:
             share = -np.expm1(-dt / path.held_lag)
             row = scipy.signal.lfilter([share], [1, share - 1], row)
-        force = np.clip(path.gain * row, -path.limit, path.limit)
+        force = np.clip(path.gain * row, -path.limit, path.limit) if path != PLAIN else row
         whole, part = path.parts(dt)
         forces.append(_shifted(force, whole + (part > 0)))
         if part:
@@ -73,7 +76,7 @@ def recorded(paths: Sequence[Path], order: Sequence[int], outputs: Array, dt: fl
     """What the recorder gets of the structure's readings (n_outputs, n_samples); `order` says which on which cable."""
     signals = outputs.copy()
     for i, path in enumerate(paths):
-        if path != Path():
+        if path != PLAIN:
             signal = path.gain * _shifted(outputs[i], _samples(path, dt)) + _hum(path, outputs.shape[1], dt)
             signals[i] = np.clip(signal, -path.limit, path.limit)
     signals = signals[list(order)] if order else signals
@@ -94,7 +97,7 @@ def structural(paths: Sequence[Path], order: Sequence[int], recorded: Array, dt:
     if order:
         readings[list(order)] = recorded
     for i, path in enumerate(paths):
-        if path != Path():
+        if path != PLAIN:
             clipped = np.abs(readings[i]) >= path.limit
             gain = path.gain if abs(path.gain) > 1e-6 else np.nan
             readings[i] = np.where(clipped, np.nan, (readings[i] - _hum(path, recorded.shape[1], dt)) / gain)

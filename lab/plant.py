@@ -191,7 +191,7 @@ def ready(plant: Plant, dt: float, *, substeps: int = 6) -> Responder:
     )
     lagging_in = [i for i, path in enumerate(plant.input_paths) if path.lag]
     lagging_out = [i for i, path in enumerate(plant.output_paths) if path.lag]
-    late = [i for i, path in enumerate(plant.input_paths) if path.parts(dt)[1]]
+    late = [i for i, path in enumerate(plant.input_paths) if path.delay and path.parts(dt)[1]]
     a, b = 2 * n + len(lagging_in), 2 * n + len(lagging_in) + len(lagging_out)
     n_u = n_in + len(late) + len(tones)
     A, B, W = np.zeros((b, b)), np.zeros((b, n_u)), np.zeros((b, len(rows)))
@@ -251,7 +251,7 @@ def _late_readings(
     """
     both, at, C, D, E = D, np.zeros(len(C), dtype=np.int64), C.copy(), _acting(D, 0.0, changes), E.copy()
     for i, path in enumerate(plant.output_paths):
-        ahead = (1 - path.parts(dt)[1]) * dt
+        ahead = (1 - path.parts(dt)[1]) * dt if path.delay else dt
         if ahead < dt:
             at[i] = min(int(ahead / dt * sub + 1e-9), sub - 1)
             start = at[i] * dt / sub

@@ -48,7 +48,8 @@ class Twin:
         """The plant with masses, stiffnesses and dampings multiplied by factors, one per body or spring."""
         return replace(
             self.plant,
-            mass=self.plant.mass + np.tensordot(mass - 1, self.masses, axes=1),
+            mass=self.plant.mass
+            + ((mass - 1) @ self.masses.reshape(mass.size, -1)).reshape(self.plant.mass.shape),
             stiffness=self.plant.stiffness + self._spread(self.stiffness * (stiffness - 1)),
             damping=self.plant.damping + self._spread(self.damping * (damping - 1)),
             spring_stiffness=self.stiffness * stiffness,

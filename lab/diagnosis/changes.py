@@ -56,7 +56,7 @@ def large_changes(
         lifted = misfit.parameters.lifted(direction)
         for factor in DAMPING_FACTORS if cause == "damping_change" else FACTORS:
             theta = present.theta + np.log(factor) * direction / misfit.parameters.widths
-            theta = _restarted(misfit, theta)
+            theta = _restarted(replace(misfit, n_train=window), theta)
             tried.append((level(theta, lifted), cause, location, direction, theta))
     best: dict[tuple[str, str], tuple[float, str, str, Array, Array]] = {}
     for trial in sorted(tried, key=lambda trial: trial[0]):

@@ -194,6 +194,11 @@ class Misfit:
             [u[:, :n] for (u, _), n in zip(self.records, self.n_train, strict=True)], axis=1
         )
 
+    @cached_property
+    def _gaps(self) -> tuple[bool, ...]:
+        """Whether samples of each record are missing."""
+        return tuple(bool(np.any(np.isnan(y))) for _, y in self.records)
+
     def plant(self, theta: Array, causes: Sequence[Hypothesis] = ()) -> Plant:
         """The plant at parameters `theta` with causes in it."""
         plant = self.twin.changed(*self.parameters.factors(theta))
@@ -222,7 +227,10 @@ class Misfit:
             predicted = responder.outputs(
                 u, n, initial=start, observer=observer, measured=y, n_record=y.shape[1]
             )
-            parts.append(np.where(np.isnan(y[:, :n]), 0.0, y[:, :n] - predicted))
+            error = y[:, :n] - predicted
+            if self._gaps[number]:
+                error[np.isnan(y[:, :n])] = 0.0
+            parts.append(error)
         return np.concatenate(parts, axis=1)
 
 

@@ -10,11 +10,14 @@ import scipy.stats
 from identification.recording import Array, Recording
 from lab.diagnosis.fit import Fit, weights
 from lab.diagnosis.misfit import Misfit
+from lab.paths import recorded
 from lab.plant import Plant, ready
 from lab.rig import Rig
 
 LEVEL = 1e-3
 """Probability that a record that begins at rest is taken for one that does not."""
+PLACEBOS = 8
+"""Later instants from which a residual is regressed on free motion, to learn how much of it passes for one anyway."""
 
 
 def free_decays(recording: Recording) -> tuple[int, ...]:
@@ -38,19 +41,26 @@ def moving(misfit: Misfit, fit: Fit) -> tuple[int, ...]:
     """Numbers of further records whose residual says that they did not begin at rest.
 
     The residual is regressed on the free motion from every start; under rest the fall of its squares, in units of the
-    noise, is chi-square distributed.
+    noise, is chi-square distributed. Where the model is wrong the residual is no noise: then the fall must stand out from
+    those at later instants, where nothing started (overdispersion as in quasi-likelihood, McCullagh and Nelder 1989, 4.5).
     """
     plant = misfit.plant(fit.theta)
     w, first, found = weights(fit.residual, misfit.colour), 0, []
     for number, n in enumerate(misfit.n_train):
-        e = (fit.residual[:, first : first + n] * w[:, None]).ravel()
+        e = fit.residual[:, first : first + n] * w[:, None]
         first += n
         if number in misfit.parameters.started:
             continue
-        swing = (_swings(plant, misfit.dt, n) * w[:, None]).reshape(2 * plant.n_dofs, -1)
+        length = n // 2
+        swing = (_swings(plant, misfit.dt, length) * w[:, None]).reshape(2 * plant.n_dofs, -1)
         swing /= np.linalg.norm(swing, axis=1, keepdims=True)
-        start = np.linalg.lstsq(swing @ swing.T, swing @ e, rcond=1e-10)[0]
-        if (swing @ e) @ start > scipy.stats.chi2.isf(LEVEL, swing.shape[0]):
+        inverse = np.linalg.pinv(swing @ swing.T, rcond=1e-10, hermitian=True)
+        falls = []
+        for instant in np.linspace(0, n - length, PLACEBOS + 1).astype(int):
+            match = swing @ e[:, instant : instant + length].ravel()
+            falls.append(match @ inverse @ match)
+        dispersion = max(np.mean(falls[1:]) / swing.shape[0], 1.0)
+        if falls[0] > dispersion * scipy.stats.chi2.isf(LEVEL, swing.shape[0]):
             found.append(number)
     return tuple(found)
 
@@ -98,6 +108,11 @@ def start_of(rig: Rig, dofs: tuple[str, ...], start: Array) -> tuple[Array, Arra
 def _swings(plant: Plant, dt: float, n_samples: int) -> Array:
     """Free motion of the linear part of a plant from every unit start, (2 n_dofs, n_outputs, n_samples)."""
     paths = tuple(replace(path, hum=(), limit=np.inf) for path in plant.output_paths)
-    responder = ready(replace(plant, laws=(), tones=(), output_paths=paths), dt)
-    silence = np.zeros((len(plant.inputs), n_samples))
-    return np.array([responder.outputs(silence, n_samples, initial=row) for row in np.eye(2 * plant.n_dofs)])
+    F, *_, C, _, _ = ready(replace(plant, laws=(), tones=(), output_paths=paths), dt).matrices
+    # C, C F, C F², …, doubled in length by each product.
+    readings, power = C[None], F
+    while len(readings) < n_samples:
+        readings = np.concatenate([readings, readings @ power])
+        power = power @ power
+    swings = readings[:n_samples, :, : 2 * plant.n_dofs].transpose(2, 1, 0)
+    return np.array([recorded(paths, plant.order, np.ascontiguousarray(swing), dt) for swing in swings])

@@ -92,29 +92,30 @@ def with_oscillator(plant: Plant, body: Array, body_mass: float, oscillator: Att
     weights, directions = np.linalg.eigh(body / body_mass)
     n = plant.n_dofs
     # Other oscillators may be there already.
-    directions = np.pad(directions[:, weights > 0.5], ((0, n - len(body)), (0, 0)))
+    directions = _padded(directions[:, weights > 0.5], n - len(body), 0)
     extra = directions.shape[1]
     omega = 2 * pi * oscillator.frequency_hz
     relative = np.vstack([-directions, np.eye(extra)])  # extension of each oscillator's spring
     tie = relative @ relative.T
-
-    def grown(matrix: Array, add: Array) -> Array:
-        return np.pad(matrix, ((0, extra), (0, extra))) + add
-
-    def wide(matrix: Array) -> Array:
-        return np.pad(matrix, ((0, 0), (0, extra)))
-
     inertia = np.zeros((n + extra, n + extra))
     inertia[n:, n:] = oscillator.mass * np.eye(extra)
+    damping = 2 * oscillator.damping_ratio * oscillator.mass * omega * tie
     return replace(
         plant,
-        mass=grown(plant.mass, inertia),
-        damping=grown(plant.damping, 2 * oscillator.damping_ratio * oscillator.mass * omega * tie),
-        stiffness=grown(plant.stiffness, oscillator.mass * omega**2 * tie),
-        forces=np.pad(plant.forces, ((0, extra), (0, 0))),
-        displacement=wide(plant.displacement),
-        velocity=wide(plant.velocity),
-        acceleration=wide(plant.acceleration),
-        laws=tuple(replace(law, row=np.pad(law.row, (0, extra))) for law in plant.laws),
-        tones=tuple(replace(tone, row=np.pad(tone.row, (0, extra))) for tone in plant.tones),
+        mass=_padded(plant.mass, extra, extra) + inertia,
+        damping=_padded(plant.damping, extra, extra) + damping,
+        stiffness=_padded(plant.stiffness, extra, extra) + oscillator.mass * omega**2 * tie,
+        forces=_padded(plant.forces, extra, 0),
+        displacement=_padded(plant.displacement, 0, extra),
+        velocity=_padded(plant.velocity, 0, extra),
+        acceleration=_padded(plant.acceleration, 0, extra),
+        laws=tuple(replace(law, row=np.concatenate([law.row, np.zeros(extra)])) for law in plant.laws),
+        tones=tuple(replace(tone, row=np.concatenate([tone.row, np.zeros(extra)])) for tone in plant.tones),
     )
+
+
+def _padded(matrix: Array, rows: int, columns: int) -> Array:
+    """The matrix with so many rows and columns of zeros behind."""
+    padded = np.zeros((matrix.shape[0] + rows, matrix.shape[1] + columns))
+    padded[: matrix.shape[0], : matrix.shape[1]] = matrix
+    return padded
