@@ -22,14 +22,14 @@ class Choice:
     Attributes:
         chosen: positions of blocks, in rising order.
         score: of the criterion.
-        ceiling: score that no choice exceeds; None where no bound is known.
+        ceiling: score that no choice exceeds.
         proven: whether every choice was compared.
         layouts, scores: of every choice, best first, where all were compared; no rows otherwise.
     """
 
     chosen: tuple[int, ...]
     score: float
-    ceiling: float | None
+    ceiling: float
     proven: bool
     layouts: np.ndarray
     scores: Array

@@ -26,6 +26,7 @@ class Criterion:
         measure: what the figure is, in words; smaller figures are better.
         score: G, shape (n, m, m), to scores, shape (n,); minus infinity for layouts that tell nothing.
         slope: G, shape (m, m), to the derivative of the score, shape (m, m); None where the score is not concave.
+        top: score that no G exceeds.
         figure: scores to figures that an engineer can read, smaller ones better.
         smooth: whether the slope is a derivative and not only one of many.
     """
@@ -36,6 +37,7 @@ class Criterion:
     slope: Callable[[Array], Array] | None
     figure: Callable[[Array], Array]
     smooth: bool = True
+    top: float = np.inf
 
 
 def _log_det(G: Array) -> Array:
@@ -120,7 +122,12 @@ CRITERIA = {
             smooth=False,
         ),
         Criterion(
-            "mac", "largest MAC between two modes", lambda G: -off_diagonal_mac(G), None, lambda score: -score
+            "mac",
+            "largest MAC between two modes",
+            lambda G: -off_diagonal_mac(G),
+            None,
+            lambda score: -score,
+            top=0.0,
         ),
         Criterion(
             "visibility",

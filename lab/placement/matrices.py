@@ -9,7 +9,7 @@ import numpy as np
 
 from identification.recording import Array
 from lab.errors import LabError
-from lab.placement.candidates import Candidates
+from lab.placement.candidates import Candidates, subsets
 from lab.placement.contest import (
     MEASURES,
     Choice,
@@ -24,6 +24,7 @@ from lab.placement.contest import (
 from lab.placement.matrix_search import STARTS, searched
 from lab.placement.outcome import Drive, Placement, Ranked
 from lab.placement.plan import Plan, alternatives, peak, total_duration
+from lab.placement.search import count
 from lab.rig import Rig
 
 WORK = 6e10
@@ -31,6 +32,8 @@ WORK = 6e10
 half a minute."""
 LOOKED_AT = 5_000_000
 """Layouts up to this number are looked through for possible ones."""
+MAX_SETS = 500
+"""Sets of actuators up to this number are all tried for a bound."""
 TOLD = 5
 """Best layouts that are told by name."""
 
@@ -102,7 +105,7 @@ def place_matrices(
         ranking[0].actuators,
         ranking[0].figure,
         proven,
-        ranking[0].figure if proven else None,
+        ranking[0].figure if proven else floor(contest),
         n_layouts,
         len(choices) if n_layouts <= LOOKED_AT else n_layouts,
         np.sort(finite),
@@ -110,6 +113,18 @@ def place_matrices(
         drives=tuple(_drives(contest, best)),
         warnings=tuple(_warnings(contest, n_layouts, proven)),
     )
+
+
+def floor(contest: Contest) -> float | None:
+    """A figure that no layout goes below: that of all sensors together, under the actuators that suit them best.
+
+    A further sensor can only add information. None where there are too many sets of actuators.
+    """
+    actuators = contest.actuators
+    if count(len(actuators), contest.n_actuators, n_fixed=len(actuators.fixed)) > MAX_SETS:
+        return None
+    sets = subsets(len(actuators), contest.n_actuators, actuators.fixed)
+    return min(figure(contest.by_sensor(acting).sum(axis=0), contest.criterion) for acting in sets)
 
 
 def _ranked(name: str, contest: Contest, choice: Choice, figures: Array) -> Ranked:

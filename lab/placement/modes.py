@@ -17,6 +17,7 @@ from lab.placement.loading import added_mass, frequency_shifts
 from lab.placement.modal_drives import MEASURE, modal_drives
 from lab.placement.outcome import Drive, Placement, Ranked
 from lab.placement.plan import Plan, usual_plan
+from lab.placement.roving import arranged
 from lab.placement.search import count, greedy
 from lab.placement.shapes import choose_actuators, normal_modes, sensor_shapes
 from lab.rig import Rig
@@ -103,12 +104,12 @@ def place_modes(
     if len(found.layouts) > 1:
         last = np.flatnonzero(np.isfinite(found.scores))[-1]
         ranking.append(_ranked("worst", grams, found.layouts[last], rule, found, sensors, named))
-    arranged = _arranged(found.chosen, stay, setups)
-    shifts = _loading(rig, sensors, arranged, shapes, sensor_mass)
+    placed = arranged(grams, found.chosen, stay, setups)
+    shifts = _loading(rig, sensors, placed, shapes, sensor_mass)
     possible = found.scores[np.isfinite(found.scores)]
     n_layouts = count(len(sensors), total, n_fixed=len(fixed))
     drives = tuple(
-        _drives(rig, plan, sensors.channels_of(arranged[0]), actuators.channels_of(inputs), omega, noise)
+        _drives(rig, plan, sensors.channels_of(placed[0]), actuators.channels_of(inputs), omega, noise)
     )
     return Placement(
         "modes",
@@ -119,16 +120,16 @@ def place_modes(
         named,
         float(rule.figure(np.array(found.score))),
         found.proven,
-        None if found.ceiling is None else float(rule.figure(np.array(found.ceiling))),
+        float(rule.figure(np.array(found.ceiling))),
         n_layouts,
         len(possible) if found.proven else n_layouts,
         rule.figure(possible),
         tuple(ranking),
         drives=drives,
         drive_measure=MEASURE if drives else "",
-        setups=tuple(sensors.named(each) for each in arranged) if setups > 1 else (),
+        setups=tuple(sensors.named(each) for each in placed) if setups > 1 else (),
         frequency_shifts=shifts,
-        warnings=(*_warnings(arranged, shifts, sensor_mass), *_unsaid(len(inputs), drives)),
+        warnings=(*_warnings(placed, shifts, sensor_mass), *_unsaid(len(inputs), drives)),
     )
 
 
@@ -221,15 +222,8 @@ def _ranked(
     return Ranked(name, sensors.named(chosen), actuators, details[rule.name], rank, details)
 
 
-def _arranged(chosen: Sequence[int], stay: Sequence[int], setups: int) -> list[tuple[int, ...]]:
-    """Sensors of each set-up, references first."""
-    rest = [i for i in chosen if i not in stay]
-    per = len(rest) // setups
-    return [(*stay, *rest[k * per : (k + 1) * per]) for k in range(setups)]
-
-
 def _loading(
-    rig: Rig, sensors: Candidates, arranged: list[tuple[int, ...]], shapes: Array, mass: float
+    rig: Rig, sensors: Candidates, placed: list[tuple[int, ...]], shapes: Array, mass: float
 ) -> tuple[float, ...]:
     if not mass:
         return ()
@@ -243,17 +237,21 @@ def _loading(
             shapes,
             added_mass(rig, [rig.outputs[i].name for i in sensors.channels_of(each)], mass),
         )
-        for each in arranged
+        for each in placed
     ]
     return tuple(float(x) for x in np.min(shifts, axis=0))
 
 
-def _warnings(arranged: list[tuple[int, ...]], shifts: Sequence[float], mass: float) -> list[str]:
+def _warnings(placed: list[tuple[int, ...]], shifts: Sequence[float], mass: float) -> list[str]:
     told = []
+    if len(placed) > 1:
+        told.append(
+            "references were chosen first, as those that see the faintest mode best, and the other sensors with them"
+        )
     if shifts and min(shifts) < -1e-3:
         told.append(
             f"sensors of {mass:g} kg lower the frequency of mode {int(np.argmin(shifts)) + 1} by {-100 * min(shifts):.2g} %"
-            + (", and by another share in every set-up" if len(arranged) > 1 else "")
+            + (", and by another share in every set-up" if len(placed) > 1 else "")
             + "; use lighter ones, or put their mass into the model"
         )
     return told

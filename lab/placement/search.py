@@ -120,8 +120,8 @@ def ceiling(
     *,
     fixed: Sequence[int] = (),
     iterations: int = 300,
-) -> float | None:
-    """A score that no layout of as many blocks exceeds; None where the criterion gives no such bound.
+) -> float:
+    """A score that no layout of as many blocks exceeds; the top of the criterion where its slope gives no lower one.
 
     Blocks may be chosen in part: the score is concave, so its tangent at any such choice lies above all layouts, and
     the choice is moved (by Frank and Wolfe) until the tangent lies low.
@@ -137,7 +137,7 @@ def ceiling(
     Trans. Signal Process. 57(2), 451-462, for the relaxation.
     """
     if criterion.slope is None:
-        return None
+        return criterion.top
     n, flat = len(start), grams.reshape(len(grams), -1)
     free = np.setdiff1d(np.arange(len(grams)), list(fixed))
     G = grams[list(start)].sum(axis=0)

@@ -137,6 +137,8 @@ def test_search_finds_the_proven_best_where_it_may_not_compare_all(truss, ranked
     assert any("not proven" in warning for warning in found.warnings)
     # Exchanges from four starts need not end at the best, but end among the best few.
     assert np.sum(placement.figures < found.figure * (1 - 1e-9)) < 5
+    # More sensors tell more, so the bound is below the best of all; three more of eight are worth less than half.
+    assert 0.5 * placement.figures[0] < found.floor < placement.figures[0]
 
 
 def test_fixed_and_forbidden_channels_are_kept_and_left_out(truss, ranked):
