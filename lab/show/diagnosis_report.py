@@ -6,9 +6,10 @@ from collections.abc import Mapping
 from pathlib import Path
 
 from identification.recording import Recording
-from lab.diagnosis.outcome import Diagnosis
+from lab.diagnosis.outcome import UNEXPLAINED, Diagnosis
 from lab.diagnosis.restoring import restoring_force
 from lab.show.diagnosed import Diagnosed, about, title_of
+from lab.show.figures.causes import calibration_figure, causes_figure
 from lab.show.figures.diagnosis import draw_diagnosis
 from lab.show.figures.restoring import restoring_figure
 from lab.show.findings import (
@@ -17,9 +18,12 @@ from lab.show.findings import (
     error_table,
     finding_table,
     noise_table,
-    verdict_of,
+    where,
 )
+from lab.show.headline import GLOSSARY, headline
+from lab.show.model_modes import mode_changes
 from lab.show.page import checksums, inline, surroundings, template
+from lab.show.residuals import leftover
 
 BESIDE = ("diagnosis.json", "extended.xml")
 """Files of the same folder that the report vouches for."""
@@ -44,18 +48,27 @@ def write_diagnosis_report(
     """
     path = Path(path)
     restoring = restoring_force(diagnosis, recording) if isinstance(recording, Recording) else None
-    force = () if restoring is None else (restoring_figure(restoring),)
+    standing = any(channel.quantity == "displacement" for channel in recording.outputs)
+    drawings = [
+        causes_figure(diagnosis),
+        None if restoring is None else restoring_figure(restoring, static=standing),
+        *draw_diagnosis(diagnosis, recording),
+        calibration_figure(diagnosis),
+    ]
     own = {**surroundings(), **checksums(path.parent, BESIDE)}
     page = template("diagnosis.html.jinja").render(
         title=title_of(diagnosis, recording),
         about=about(diagnosis, recording),
-        verdict=verdict_of(diagnosis, recording),
+        verdict=headline(diagnosis),
+        rest=_rest(diagnosis, recording),
+        changes=mode_changes(diagnosis),
+        glossary=GLOSSARY,
         findings=finding_table(diagnosis),
         sentences=[finding.says for finding in diagnosis.findings],
         alternatives=alternative_table(diagnosis),
         errors=error_table(diagnosis),
         calibration=calibration_table(diagnosis),
-        figures=[inline(drawing) for drawing in (*force, *draw_diagnosis(diagnosis, recording))],
+        figures=[inline(drawing) for drawing in drawings if drawing is not None],
         explanation="",
         warnings=diagnosis.warnings,
         unlearnable=diagnosis.unlearnable,
@@ -65,3 +78,15 @@ def write_diagnosis_report(
         facts=list({**(facts or {}), **own}.items()),
     )
     path.write_text(page, encoding="utf-8", newline="\n")
+
+
+def _rest(diagnosis: Diagnosis, recording: Diagnosed) -> str:
+    """Where an unexplained error sits; nothing where all is explained, or where spectra tell no time."""
+    if (
+        diagnosis.verdict != UNEXPLAINED
+        or diagnosis.spectra is not None
+        or not isinstance(recording, Recording)
+    ):
+        return ""
+    text = where(leftover(diagnosis, recording))
+    return f"{text[:1].upper()}{text[1:]}."

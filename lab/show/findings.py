@@ -16,7 +16,7 @@ UNKNOWN = "not known"
 ERRORS = {
     "nominal": "model as given",
     "calibrated": "calibrated",
-    "extended": "with the findings",
+    "extended": "extended by the findings",
     "noise_floor": "noise floor",
 }
 

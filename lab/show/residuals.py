@@ -13,6 +13,13 @@ from lab.diagnosis.outcome import Diagnosis, Prediction, SpectralPrediction
 from lab.show.signals import Spectra, spectra
 
 MODELS = ("nominal", "calibrated", "extended")
+LABELS = {
+    "measured": "measured",
+    "nominal": "as given",
+    "calibrated": "calibrated",
+    "extended": "extended",
+}
+"""What legends call the signals."""
 N_WINDOWS = 60
 """Stretches into which all records together are cut."""
 

@@ -21,6 +21,8 @@ from lab.show.findings import (
     parameter,
     verdict_of,
 )
+from lab.show.headline import headline
+from lab.show.model_modes import mode_changes
 from lab.show.rerun_log.diagnosis import write_diagnosis_rrd
 from tests.lab.diagnosed import RATE, explained, recorded, two_masses
 from tests.lab.showcase import motion_of
@@ -65,6 +67,56 @@ def test_the_three_verdicts(diagnosis, recording):
     assert "so far" not in nothing.sentence
 
 
+def test_the_headline_is_one_sentence_that_needs_no_other(diagnosis):
+    assert headline(diagnosis).sentence == (
+        "Explained: one thing is wrong with the model, cubic stiffness at spring0_1; with that put right the model misses "
+        "1.02 % of the signal instead of 30 %, and noise alone makes 1 %."
+    )
+    clean = headline(replace(diagnosis, verdict="consistent", findings=()))
+    assert (clean.outcome, clean.sentence.split(";")[0]) == (
+        "passed",
+        "Consistent: the model describes this test",
+    )
+    left = headline(replace(diagnosis, verdict="unexplained"))
+    assert left.outcome == "failed"
+    assert (
+        "cubic stiffness at spring0_1 accounts for part of it, and no known cause for the rest"
+        in left.sentence
+    )
+    nothing = headline(replace(diagnosis, verdict="unexplained", findings=()))
+    assert nothing.sentence == (
+        "Unexplained: the model is wrong (at its best it misses 8 % of the signal, where noise alone makes 1 %), and no known "
+        "cause accounts for all of it."
+    )
+
+
+def test_the_modes_of_both_models_stand_side_by_side(diagnosis):
+    """A mass added to the second body lowers both modes as the eigenvalues of the state matrix say."""
+    heavier = EFFECTS["mass_change"].of("mass1", {"delta_mass": 0.5}).apply(diagnosis.nominal)
+    rows = mode_changes(replace(diagnosis, extended=heavier)).rows
+    K, C = np.array([[1300.0, -900.0], [-900.0, 900.0]]), np.array([[2.5, -1.5], [-1.5, 1.5]])
+
+    def frequencies(mass):
+        over = np.diag(1 / np.array(mass))
+        A = np.block([[np.zeros((2, 2)), np.eye(2)], [-over @ K, -over @ C]])
+        return np.sort(np.abs(np.linalg.eigvals(A)))[::2] / (2 * np.pi)
+
+    given, extended = frequencies([1.0, 2.0]), frequencies([1.0, 2.5])
+    assert [row[1] for row in rows] == [f"{f:.5g}" for f in given]
+    assert [row[2] for row in rows] == [f"{f:.5g}" for f in extended]
+    assert [row[-1] for row in rows] == ["BEYOND", "within"]
+    same = mode_changes(replace(diagnosis, extended=diagnosis.nominal)).rows
+    assert [row[3:] for row in same] == [("+0 %", row[4], row[4], "1", "within") for row in same]
+
+
+def test_a_new_mode_is_said_to_be_new(diagnosis):
+    values = {"mass": 0.05, "frequency_hz": 3.5, "damping_ratio": 0.01}
+    oscillator = EFFECTS["attached_oscillator"].of("mass1", values)
+    rows = mode_changes(replace(diagnosis, extended=oscillator.apply(diagnosis.nominal))).rows
+    assert len(rows) == 3
+    assert [row[-1] for row in rows].count("new") == 1
+
+
 def test_tables(diagnosis):
     assert finding_table(diagnosis).rows == (
         ("cubic stiffness", "spring0_1", "k3 = (5000000 ± 40000) N/m^3", "1234", "99 %"),
@@ -77,7 +129,7 @@ def test_tables(diagnosis):
     assert error_table(diagnosis).rows == (
         ("model as given", "30 %", "30"),
         ("calibrated", "8 %", "8"),
-        ("with the findings", "1.02 %", "1.02"),
+        ("extended by the findings", "1.02 %", "1.02"),
         ("noise floor", "1 %", "1"),
     )
     assert calibration_table(diagnosis).rows[1] == (
@@ -141,6 +193,8 @@ def test_the_page_says_the_verdict_first_and_needs_nothing_else(page):
         "Findings",
         "Alternatives to the first finding",
         "Errors on data kept aside",
+        "What it means for the modes",
+        "Words on this page",
         "Figures",
         "What these data cannot tell",
         "Noise of the outputs",
@@ -163,6 +217,9 @@ def test_the_page_says_the_verdict_first_and_needs_nothing_else(page):
         "One shaker cannot tell its gain",
         "0.0200 ± 0.0010 m/s²",
         "SHA-256 of diagnosis.json",
+        "Causes weighed.",
+        "the error that noise in the measurements makes by itself",
+        "calibrated less nominal".capitalize(),
     ):
         assert part in visible
 
@@ -266,7 +323,7 @@ def test_lines_are_the_signals_one_record_after_the_other(read, diagnosis):
         np.testing.assert_array_equal(values[~gap, column], expected)
     # Whole nanoseconds.
     np.testing.assert_allclose(nanoseconds[~gap] / 1e9, np.arange(2400) / RATE, atol=1e-9)
-    assert read.static(entity, "SeriesLines:names") == ["measured", "nominal", "calibrated", "extended"]
+    assert read.static(entity, "SeriesLines:names") == ["measured", "as given", "calibrated", "extended"]
     (left,) = (name for name in read.entities if name.startswith("/residuals") and "acc0" in name)
     _, values = read.series(left, "Scalars:scalars")
     p = diagnosis.predictions[0]
@@ -275,7 +332,7 @@ def test_lines_are_the_signals_one_record_after_the_other(read, diagnosis):
 
 def test_the_viewer_reads_the_verdict(read):
     (text,) = read.static("/summary", "TextDocument:text")
-    assert "Explained: The spring" in text
+    assert "Explained: one thing is wrong with the model" in text
     assert "cubic stiffness" in text
 
 

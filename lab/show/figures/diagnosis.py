@@ -15,6 +15,7 @@ from lab.show.drawing import SERIES
 from lab.show.figures.canvas import Drawing, drawing, few_ticks, logarithmic, plain
 from lab.show.residuals import (
     CLOSE_UP,
+    LABELS,
     levels,
     relative_errors,
     residual_spectra,
@@ -74,7 +75,9 @@ def predictions(diagnosis: Diagnosis, recording: Recording, rows: list[int]) -> 
             whole.axvspan(time[start], time[shown][-1], color="0.88", zorder=0)
             close.plot(time[shown], prediction.measured[row, shown], label="measured", **MEASURED)
             for model in models:
-                close.plot(time[shown], getattr(prediction, model)[row, shown], label=model, **LOOKS[model])
+                close.plot(
+                    time[shown], getattr(prediction, model)[row, shown], label=LABELS[model], **LOOKS[model]
+                )
             channel = recording.outputs[row]
             whole.set_ylabel(
                 f"{plain(channel.name, 16)}\n[{channel.unit.replace('^2', '²')}]",
@@ -123,7 +126,7 @@ def residuals_over_time(diagnosis: Diagnosis, recording: Recording, rows: list[i
         for axes, row in zip(frames, rows, strict=True):
             for number, (start, part) in enumerate(zip(starts, parts, strict=False)):
                 for model in shown_models(diagnosis):
-                    label = model if number == 0 else None
+                    label = LABELS[model] if number == 0 else None
                     axes.plot(
                         start + part.time, _positive(part.residual[model][row]), label=label, **LOOKS[model]
                     )
@@ -164,7 +167,7 @@ def residuals_over_frequency(diagnosis: Diagnosis, recording: Recording, rows: l
                 axes.plot(
                     f,
                     _positive(spectrum.output_density[row, 1:]),
-                    label=f"{model}, residual",
+                    label=f"{LABELS[model]}, residual",
                     **{**LOOKS[model], "linewidth": 0.8},
                 )
             _floor(axes, white[row])
@@ -201,7 +204,7 @@ def residuals_over_amplitude(diagnosis: Diagnosis, recording: Recording, rows: l
                     marker=marks[model],
                     markersize=3.5,
                     color=LOOKS[model]["color"],
-                    label=model,
+                    label=LABELS[model],
                 )
             _floor(axes, floor[row])
             axes.set_xlim(left=0)

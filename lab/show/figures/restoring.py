@@ -12,8 +12,13 @@ from lab.show.figures.canvas import Drawing, drawing, few_ticks, plain
 AXIS = {"extension": "extension [m]", "rate": "rate of extension [m/s]"}
 
 
-def restoring_figure(restoring: Restoring) -> Drawing:
-    """Force over extension, or over its rate for a law of damping."""
+def restoring_figure(restoring: Restoring, *, static: bool = True) -> Drawing:
+    """Force over extension, or over its rate for a law of damping.
+
+    Args:
+        restoring: points from the measurements and of the law.
+        static: whether any output senses where the structure stands, as accelerometers do not.
+    """
     order = np.argsort(restoring.law_x)
 
     def paint(figure: Figure) -> None:
@@ -54,4 +59,8 @@ def restoring_figure(restoring: Restoring) -> Drawing:
         "measured outputs and the linear rest of the model alone, without the law; where they follow the law found, the law "
         "is right. Their scatter is the noise of the measurements."
     )
+    if not static:
+        caption += (
+            " Accelerometers do not sense constant forces, so the cloud of dots may be shifted as a whole."
+        )
     return drawing("restoring-force", 3.2, caption, paint)

@@ -7,7 +7,7 @@ from matplotlib.figure import Figure
 from lab.diagnosis.outcome import Diagnosis, SpectralPrediction
 from lab.show.figures.canvas import Drawing, drawing, logarithmic, plain
 from lab.show.figures.diagnosis import LOOKS, MEASURED
-from lab.show.residuals import shown_models, worst_rows
+from lab.show.residuals import LABELS, shown_models, worst_rows
 
 
 def draw_spectra(diagnosis: Diagnosis, spectra: SpectralPrediction) -> Drawing:
@@ -19,7 +19,9 @@ def draw_spectra(diagnosis: Diagnosis, spectra: SpectralPrediction) -> Drawing:
         for axes, row in zip(frames, rows, strict=True):
             axes.plot(spectra.frequency_hz, spectra.measured[row], label="measured", **MEASURED)
             for model in models:
-                axes.plot(spectra.frequency_hz, getattr(spectra, model)[row], label=model, **LOOKS[model])
+                axes.plot(
+                    spectra.frequency_hz, getattr(spectra, model)[row], label=LABELS[model], **LOOKS[model]
+                )
             unit = spectra.units[row].replace("^2", "²")
             axes.set_ylabel(f"{plain(spectra.names[row], 24)}\n[{unit}]", rotation=0, ha="right", va="center")
             logarithmic(axes)

@@ -12,10 +12,11 @@ import rerun as rr
 import rerun.blueprint as rrb
 
 from identification.recording import Recording
-from lab.diagnosis.outcome import Diagnosis
+from lab.diagnosis.outcome import UNEXPLAINED, Diagnosis
 from lab.diagnosis.restoring import restoring_force
 from lab.show.diagnosed import Diagnosed, title_of
-from lab.show.findings import calibration_table, error_table, finding_table, verdict_of
+from lab.show.findings import calibration_table, error_table, finding_table, where
+from lab.show.headline import headline
 from lab.show.rerun_log.leftovers import (
     log_over_amplitude,
     log_over_frequency,
@@ -28,7 +29,7 @@ from lab.show.rerun_log.restoring import log_restoring
 from lab.show.rerun_log.scene import time_panel
 from lab.show.rerun_log.side_by_side import log_structures
 from lab.show.rerun_log.spectra import log_spectra
-from lab.show.residuals import relative_errors, shown_models, worst_rows
+from lab.show.residuals import leftover, relative_errors, shown_models, worst_rows
 
 if TYPE_CHECKING:
     from lab.simulate import Motion
@@ -125,7 +126,9 @@ def _residual_tab(
 
 def _summary(title: str, diagnosis: Diagnosis, recording: Diagnosed) -> str:
     """Verdict, findings, errors and calibration in Markdown."""
-    lines = [f"# {plain(title)}", "", plain(verdict_of(diagnosis, recording).sentence)]
+    lines = [f"# {plain(title)}", "", plain(headline(diagnosis).sentence)]
+    if diagnosis.verdict == UNEXPLAINED and isinstance(recording, Recording) and diagnosis.spectra is None:
+        lines += ["", plain(f"What is left: {where(leftover(diagnosis, recording))}.")]
     if diagnosis.findings:
         lines += ["", "## Findings", "", *_findings(diagnosis)]
     for name, table in (

@@ -14,7 +14,15 @@ from lab.show.drawing import Axes, rgb, round_range
 from lab.show.rerun_log.plot import Curve, log_plot
 from lab.show.rerun_log.scene import TIMELINE, join
 from lab.show.rerun_log.spectra import COLORS, log_levels
-from lab.show.residuals import CLOSE_UP, levels, residual, residual_spectra, shown_models, worst_stretch
+from lab.show.residuals import (
+    CLOSE_UP,
+    LABELS,
+    levels,
+    residual,
+    residual_spectra,
+    shown_models,
+    worst_stretch,
+)
 from lab.show.signals import envelope, spectra
 
 PLOT = (200.0, 90.0)
@@ -98,7 +106,7 @@ def log_over_amplitude(
             round_range(np.append(motion, 0.0)), round_range(np.append(list(left.values()), 0.0)), *PLOT
         )
         curves = [
-            Curve(model, motion, values, COLORS[model], dots=True, radius=2.0)
+            Curve(LABELS[model], motion, values, COLORS[model], dots=True, radius=2.0)
             for model, values in left.items()
         ]
         name = f"{channel.name}: RMS residual over RMS measured [{channel.unit}]"
@@ -145,7 +153,7 @@ def _log_lines(
         start += signal.shape[1] / rate
     names = list(lines)
     style = rr.SeriesLines(
-        names=names,
+        names=[LABELS[name] for name in names],
         colors=[rgb(COLORS[name]) for name in names],
         widths=[2.5 if name == "measured" else 1.0 for name in names],
         aggregation_policy=rr.components.AggregationPolicy.MinMax,

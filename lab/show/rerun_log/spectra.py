@@ -14,6 +14,7 @@ from lab.show.drawing import SERIES, Axes, rgb
 from lab.show.rerun_log.channels import by_unit, slug
 from lab.show.rerun_log.plot import Curve, log_plot, log_texts
 from lab.show.rerun_log.scene import join
+from lab.show.residuals import LABELS
 from lab.show.signals import Spectra, coherence, upper_frequency
 
 COLORS = {"measured": SERIES[7], "nominal": SERIES[1], "calibrated": SERIES[4], "extended": SERIES[0]}
@@ -134,7 +135,7 @@ def log_levels(
     levels = {model: decibels(value, factor=factor) for model, value in values.items()}
     axes = Axes((0.0, float(frequency_hz[-1])), level_range(list(levels.values())), *size)
     curves = [
-        Curve(model, frequency_hz, level, COLORS[model], radius=1.5 if model == "measured" else 0.75)
+        Curve(LABELS[model], frequency_hz, level, COLORS[model], radius=1.5 if model == "measured" else 0.75)
         for model, level in levels.items()
     ]
     return log_plot(stream, origin, name, axes, curves)
