@@ -1,5 +1,7 @@
 """The summary: one screen, with the numbers that matter."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -48,9 +50,10 @@ def against(truth, found):
 def test_says_what_was_found():
     text = summary(result(2, warnings=("the record is short",), notes=("It was chosen.", "For a reason.")))
     assert text.startswith("A bridge\nera, order 2, sampled at 50 Hz\n")
-    assert "  x0              1              0\n  x1              0              2\n" in text
+    # Six digits, where nothing says how many are known.
+    assert "  x0            1            0\n  x1            0            2\n" in text
     assert "7.5" in text
-    assert "   1          1       1.25     yes\n   2          2       1.25     yes" in text
+    assert "   1          1       1.25    yes\n   2          2       1.25    yes" in text
     assert "It was chosen. For a reason." in text
     assert text.endswith("warning: the record is short")
     assert "true" not in text
@@ -83,10 +86,35 @@ def test_lays_the_truth_beside_it():
     assert "MISSED mac: not available (limit 0.9)" in text
 
 
+@pytest.mark.parametrize(
+    ("std", "printed"),
+    [(0.02, "1.235"), (2e-5, "1.234568"), (0.0, "1.23456789"), (np.inf, "1.23457"), (3.0, "1.23")],
+)
+def test_digits_are_those_that_the_error_bars_support(std, printed):
+    """Two of the largest error bar's own digits, at least three and at most ten in all; six where nothing is known."""
+    matrices = SecondOrder(
+        np.array([[1.23456789]]), np.eye(1), np.eye(1), ("x0",), *([np.full((1, 1), std)] * 3)
+    )
+    row = summary(result(1, second_order=matrices)).split("M [kg]")[1].splitlines()[1]
+    assert row.split() == ["x0", printed]
+
+
+def test_modes_have_their_error_bars():
+    plain = result(2)
+    barred = replace(plain.modes, frequency_std=np.array([0.00123, 0.2]), damping_std=np.array([1e-4, 0.0]))
+    lines = summary(result(2, modes=barred)).splitlines()
+    row = next(line for line in lines if line.startswith("   1 "))
+    assert row.split() == ["1", "1", "0.0012", "1.25", "0.01", "yes"]
+    head = next(line for line in lines if line.startswith("mode "))
+    assert head.split() == ["mode", "Hz", "±", "damping", "%", "±", "stable"]
+
+
 @pytest.mark.parametrize("n_dofs", [1, 5, 8, 9, 40])
 def test_fits_a_screen(n_dofs):
-    found = result(n_dofs, 40)
-    text = summary(found)
+    truth, std = result(n_dofs, 40), np.full(40, 9.9e-12)
+    barred = replace(truth.modes, frequency_std=std, damping_std=std)
+    found = result(n_dofs, 40, modes=barred)
+    text = summary(replace(found, **against(truth, found)))
     assert len(text.splitlines()) < 60
     assert max(map(len, text.splitlines())) <= 100
 
