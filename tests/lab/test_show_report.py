@@ -3,8 +3,6 @@
 import hashlib
 import html
 import re
-import shutil
-import subprocess
 from collections import Counter
 from dataclasses import replace
 from html.parser import HTMLParser
@@ -265,27 +263,6 @@ def test_names_in_other_scripts_reach_the_browser(tmp_path):
         assert name in drawings[0].svg
         assert name in drawings[1].svg
     assert "\N{REPLACEMENT CHARACTER}" in drawings[0].svg  # beyond the stand-ins, yet no failure
-
-
-@pytest.mark.slow
-@pytest.mark.skipif(shutil.which("chromium") is None, reason="needs Chromium")
-def test_a_browser_opens_and_prints_it(page, tmp_path):
-    options = ["--headless", "--no-sandbox", "--disable-gpu", f"--user-data-dir={tmp_path / 'profile'}"]
-    browser = ["chromium", *options, "--enable-logging=stderr", "--v=0"]
-    dump = subprocess.run(
-        [*browser, "--dump-dom", page.as_uri()], capture_output=True, text=True, timeout=120
-    )
-    assert dump.returncode == 0
-    assert "CONSOLE" not in dump.stderr
-    # The browser's own tree has what the file has: nothing was dropped as an error.
-    ours, theirs = Page(page.read_text(encoding="utf-8")), Page(dump.stdout)
-    assert theirs.tags == ours.tags
-    printed = tmp_path / "report.pdf"
-    subprocess.run(
-        [*browser, f"--print-to-pdf={printed}", page.as_uri()], check=True, capture_output=True, timeout=120
-    )
-    assert printed.read_bytes().startswith(b"%PDF-")
-    assert printed.stat().st_size > 20_000
 
 
 def test_the_criteria_of_the_field_stand_in_a_table_with_their_sources(rig, tmp_path):
