@@ -17,6 +17,8 @@ from lab.studies.workers import Crew
 
 BATCH_SECONDS = 0.3
 """Aim for the time of a batch: long beside the cost of handing it out, short beside what anybody waits for."""
+BATCHES_PER_SECOND = 100.0
+"""So many a scheduler hands out with ease: the batches of a larger crew last longer."""
 AHEAD = 2
 """Batches per worker handed out at a time: one in work, one ready."""
 MAX_DEATHS = 2
@@ -127,9 +129,9 @@ class _Dispatch:
         self.given_up.clear()
 
     def _adapt(self, lines: Sequence[str]) -> None:
-        """Batches of about BATCH_SECONDS, growing step by step since the first runs are slow."""
+        """Batches that last long enough, growing step by step since the first runs are slow."""
         seconds = sum(json.loads(line)["seconds"] for line in lines) / len(lines)
-        fitting = BATCH_SECONDS / max(seconds, 1e-6)
+        fitting = max(BATCH_SECONDS, self.crew.size() / BATCHES_PER_SECOND) / max(seconds, 1e-6)
         self.batch_size = max(1, min(round(fitting), 4 * self.batch_size))
 
     def _bury(self, given: _Given, error: Exception) -> None:

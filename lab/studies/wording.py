@@ -145,7 +145,7 @@ def _shortened(column: Sequence[Any]) -> list[str]:
 
 def _short(value: Any) -> str:
     """A value of a setting, cut where it is long; of a list, how many it has comes first."""
-    text = told(value)
+    text = f"{value:.4g}" if isinstance(value, float) else told(value)
     if isinstance(value, list) and len(text) > MAX_SHORT:
         text = f"{len(value)}: {text}"
     return _cut(text)

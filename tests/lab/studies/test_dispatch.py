@@ -9,11 +9,11 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from lab.errors import StudyError
-from lab.studies.dispatch import AHEAD, BATCH_SECONDS, dispatch
+from lab.studies.dispatch import AHEAD, BATCH_SECONDS, BATCHES_PER_SECOND, dispatch
 from lab.studies.evaluate import Task
 from lab.studies.plan import Run
 from lab.studies.workers import Crew
-from tests.lab.studies.small import Following
+from tests.lab.studies.small import Following, Here
 
 TASK = Task({}, "", {})
 
@@ -48,6 +48,21 @@ def test_batches_grow_for_short_runs_and_shrink_towards_the_end():
     sizes = [len(lines) for lines in dispatched(2000, Crew(lambda: executor, lambda: 1)) if lines]
     assert max(sizes) == 100
     assert sizes[0] == sizes[-1] == 1
+
+
+def test_batches_of_a_large_crew_last_so_long_that_one_scheduler_keeps_up():
+    sizes, crew = [], Crew(Here, lambda: 300)
+    runs = (Run(k, {}, k) for k in range(20_000))
+    dispatch(
+        TASK,
+        runs,
+        20_000,
+        crew,
+        lambda lines: sizes.append(len(lines)),
+        work=lambda _, batch: [line(run, 0.3) for run in batch],
+    )
+    # Three hundred workers, each busy with ten runs of 0.3 s: a hundred batches a second.
+    assert max(sizes) == 300 / BATCHES_PER_SECOND / 0.3
 
 
 def test_long_runs_go_one_by_one():
