@@ -8,7 +8,7 @@ model = lab.load_model("chain3_uncoupled").connected(
 )
 hardening = CubicStiffness("spring2_3", k3=3.0).apply(model)
 noisy = lab.instrument(hardening, noise_percent=1.0)
-recording = lab.simulate(noisy, lab.Random(rms=1.0), sample_rate=5.0, duration=300.0, seed=2)
+recording = lab.simulate(noisy, lab.Random(rms=1.0), sample_rate=5.0, duration=200.0, seed=2)
 
 diagnosis = lab.diagnose(recording, model)
 print(diagnosis.verdict)

@@ -108,13 +108,14 @@ def test_json_is_the_file_and_nothing_else(engine, bench, capsys):
     assert printed.err == ""
 
 
-def test_widths_and_effects_reach_the_engine(engine, bench):
+def test_widths_and_effects_reach_the_engine(engine, bench, monkeypatch):
+    monkeypatch.setattr("lab.diagnose_files.present_diagnosis", lambda *_, **__: None)
     asked = ("--widths", "damping=0.5,mass=0.01", "--widths", "stiffness spring0_1=0.1", "--quiet")
     few = ("--effects", "freeplay, cubic_stiffness", "--effects", "sensor_gain")
     assert status(*ASKED, *asked, *few) == 0
     assert engine.widths == {"damping": 0.5, "mass": 0.01, "stiffness spring0_1": 0.1}
     assert engine.effects == {name: EFFECTS[name] for name in ("freeplay", "cubic_stiffness", "sensor_gain")}
-    assert status(*ASKED, "--quiet", "--force") == 0
+    assert status(*ASKED, "--quiet", "--out", "again") == 0
     assert (engine.widths, engine.effects) == ({}, EFFECTS)
 
 
