@@ -96,7 +96,8 @@ def _rig(model: str | Path | None, scenario: Scenario | None) -> Rig:
 def _frequencies(rig: Rig, n_sensors: int, settings: Mapping[str, Any]) -> Array:
     """Natural frequencies that the test must cover [Hz]: for modes, those asked for."""
     if settings.get("target", "modes") == "modes":
-        return normal_modes(rig)[0][: settings.get("n_modes", n_sensors)] / (2 * np.pi)
+        n_channels = n_sensors * (3 if settings.get("triaxial") else 1)
+        return np.asarray(normal_modes(rig)[0][: settings.get("n_modes", n_channels)] / (2 * np.pi))
     return rig.second_order().modes().frequency_hz
 
 

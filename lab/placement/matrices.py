@@ -7,7 +7,10 @@ from math import comb
 
 import numpy as np
 
+from identification.information import fisher_information
+from identification.information import planned as planned_test
 from identification.recording import Array
+from identification.structures import free_matrices
 from lab.errors import LabError
 from lab.placement.candidates import Candidates, subsets
 from lab.placement.contest import (
@@ -18,7 +21,6 @@ from lab.placement.contest import (
     figure,
     figures_of,
     impossible,
-    known_of,
     possible_layouts,
 )
 from lab.placement.matrix_search import STARTS, searched
@@ -150,18 +152,23 @@ def _drives(contest: Contest, best: Choice) -> Iterator[Drive]:
     """The best layout under other signals of the same largest force, with the noise that it has in the planned test."""
     rig, plan = contest.rig, contest.plan
     inputs, outputs = contest.actuators.channels_of(best[1]), contest.sensors.channels_of(best[0])
-    std = plan.noise_std(rig.outputs, contest.known.rms(inputs))
-    usual = np.mean(np.where(np.isfinite(std), std, 0.0), axis=0) / np.maximum(
-        np.mean(np.isfinite(std), axis=0), 1e-300
+    std = plan.noise_std(rig.outputs, contest.known.rms(inputs))[:, outputs]
+    # An output that a record does not move says nothing of the noise.
+    felt = np.isfinite(std)
+    usual = np.sum(np.where(felt, std, 0.0), axis=0) / np.maximum(np.sum(felt, axis=0), 1)
+    outputs = [i for i, noise in zip(outputs, usual, strict=True) if noise > 0]
+    known = rig.connected(
+        inputs=[rig.inputs[i].name for i in inputs], outputs=[rig.outputs[i].name for i in outputs]
     )
-    usual = np.where(usual > 0, usual, np.inf)
-    for kind, other in alternatives(rig, plan, rig.second_order().modes().frequency_hz):
-        known, units = known_of(rig, other)
-        each = known.of_outputs(inputs, np.broadcast_to(usual, known.rms(inputs).shape))
-        information = each[outputs].sum(axis=0) * units * units[:, None]
-        signals = [(name, u[inputs]) for name, u in other.signals(rig)]
-        length = total_duration(signals, other.sample_rate)
-        yield Drive(kind, length, peak(signals), figure(information, contest.criterion))
+    structure, unknown = rig.second_order(), free_matrices(rig.dofs)
+    for kind, other in alternatives(rig, plan, structure.modes().frequency_hz, inputs):
+        signals = [(name, u[inputs]) for name, u in other.signals(rig, inputs)]
+        test = planned_test(
+            [u for _, u in signals], known.inputs, known.outputs, sample_rate=other.sample_rate
+        )
+        each = fisher_information(structure, test, noise_std=usual[usual > 0], parameterization=unknown)
+        value = figure(each * contest.units * contest.units[:, None], contest.criterion)
+        yield Drive(kind, total_duration(signals, other.sample_rate), peak(signals), value)
 
 
 def _warnings(contest: Contest, n_layouts: int, proven: bool) -> Iterator[str]:

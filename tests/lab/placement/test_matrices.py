@@ -130,6 +130,17 @@ def test_named_layouts_have_the_bound_of_a_virtual_test_of_their_own(truss, rank
         assert np.isin(True, np.isclose(placement.figures, row.figure, rtol=1e-9))
 
 
+def test_signals_are_compared_at_the_same_largest_force_and_levels_scale(ranked):
+    placement, _ = ranked
+    found = {drive.excitation: drive for drive in placement.drives}
+    base = found["random as planned, times 1"]
+    # The planned test again: one record, whose noise is its own.
+    assert base.figure == pytest.approx(placement.figure, rel=1e-6)
+    assert found["random as planned, times 10"].figure == pytest.approx(base.figure / 10, rel=1e-6)
+    for kind in ("random", "burst_random", "multisine", "sweep", "pulse"):
+        assert found[kind].peak == pytest.approx(base.peak, rel=1e-12)
+
+
 def test_search_finds_the_proven_best_where_it_may_not_compare_all(truss, ranked):
     placement, plan = ranked
     found = place(truss, 5, n_actuators=4, target="matrices", quantity="acceleration", plan=plan, limit=0)
