@@ -76,6 +76,13 @@ def dof_shapes(result: Result, dofs: Sequence[str]) -> tuple[np.ndarray, np.ndar
     return aligned(shapes), known
 
 
+def within_reach(truth: Modes, modes: Modes) -> Modes:
+    """The modes of the truth up to a little above the highest identified one: what a test could have found."""
+    top = 1.1 * float(np.max(modes.frequency_hz, initial=0.0))
+    near = truth.frequency_hz <= top
+    return truth.take(near) if near.any() else truth
+
+
 @dataclass(frozen=True, eq=False)
 class ShapeTable:
     """Displacement shapes of identified modes, and of their true partners, at the same points.

@@ -141,6 +141,14 @@ def spacing(rig: Rig) -> float:
     return float(np.median(nearest)) if nearest else float(rig.model.stat.extent) / 2
 
 
+def reach(rig: Rig) -> float:
+    """How far anything drawn extends beyond the centres of bodies [m]: the largest solid of a moving body, with some room."""
+    m = rig.model
+    moving = np.isin(m.geom_bodyid, moving_bodies(rig)) & (m.geom_rgba[:, 3] > 0)
+    offset = np.linalg.norm(m.geom_pos, axis=1)
+    return max(0.25 * spacing(rig), float(np.max((m.geom_rbound + offset)[moving], initial=0.0)))
+
+
 def swing(rig: Rig, position: np.ndarray) -> float:
     """Factor that makes a motion (n_dofs, n) from the operating point plain to see."""
     hinge = rig.model.jnt_type == mujoco.mjtJoint.mjJNT_HINGE

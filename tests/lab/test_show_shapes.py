@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 
 from identification.modes import Modes, mac
 from identification.recording import Channel
-from lab.show.shapes import aligned, displacement_shapes, dof_shapes, shape_table
+from lab.show.shapes import aligned, displacement_shapes, dof_shapes, shape_table, within_reach
 from tests.lab.showcase import chain_result, chain_rig
 
 MIXED = ["pos1", "vel2", "acc3.x"]
@@ -69,3 +69,10 @@ def test_modes_without_partner_have_no_truth():
     result = chain_result(chain_rig("chain3_coupled", outputs=MIXED))
     table = shape_table(replace(result, comparison=None))
     assert np.isnan(table.truth).all()
+
+
+def test_true_modes_far_above_the_identified_ones_are_left_out():
+    truth = chain_rig("chain3_coupled", outputs=MIXED).modes()
+    assert len(within_reach(truth, truth)) == 3
+    assert len(within_reach(truth, truth.take([0]))) == 1
+    assert len(within_reach(truth, truth.take([]))) == 3  # nothing to go by

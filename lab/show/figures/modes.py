@@ -13,7 +13,7 @@ from identification.systems import SecondOrder
 from lab.result import Result
 from lab.show.drawing import SERIES
 from lab.show.figures.canvas import Drawing, drawing, logarithmic, mark_modes, plain
-from lab.show.shapes import shape_table
+from lab.show.shapes import shape_table, within_reach
 from lab.show.signals import Spectra, mean_density, upper_frequency
 
 MAX_SHAPES = 12
@@ -140,7 +140,8 @@ def mac_table(result: Result) -> Drawing | None:
     """MAC of the identified modes against the true ones, or among themselves where there is no truth."""
     if not len(result.modes):
         return None
-    other = result.truth_modes if result.truth_modes is not None and len(result.truth_modes) else result.modes
+    truth = result.truth_modes
+    other = within_reach(truth, result.modes) if truth is not None and len(truth) else result.modes
     value = mac(result.modes.shapes, other.shapes)
     rows, columns = ([f"{f:.4g}" for f in modes.frequency_hz] for modes in (result.modes, other))
     against = "identified" if other is result.modes else "true"
@@ -168,6 +169,8 @@ def mac_table(result: Result) -> Drawing | None:
         else "identified against true modes"
     )
     caption = f"Modal assurance criterion (MAC), {whose}: white 0, black 1."
+    if truth is not None and other is not result.modes and len(other) < len(truth):
+        caption += f" {len(truth) - len(other)} true modes above the highest identified one are left out."
     return drawing("mac", min(5.0, 1.0 + 0.42 * len(rows)), caption, paint)
 
 

@@ -12,6 +12,7 @@ from identification.modes import mac
 from lab.result import Result
 from lab.show.drawing import diverging, sequential
 from lab.show.rerun_log.plot import log_texts
+from lab.show.shapes import within_reach
 from lab.show.tables import MATRICES, same_dofs
 
 LUMA = np.array([0.299, 0.587, 0.114])
@@ -66,7 +67,7 @@ def log_mac(stream: rr.RecordingStream, result: Result) -> list[rrb.View]:
         return []
     pairs = [("itself", modes, "MAC of the identified modes")]
     if truth is not None and len(truth):
-        pairs.insert(0, ("truth", truth, "MAC: identified (rows), true (columns)"))
+        pairs.insert(0, ("truth", within_reach(truth, modes), "MAC: identified (rows), true (columns)"))
     views = []
     for name, other, title in pairs:
         value = mac(modes.shapes, other.shapes)

@@ -10,6 +10,7 @@ import rerun as rr
 import rerun.blueprint as rrb
 
 from lab.show import structure
+from lab.show.camera import eye
 from lab.show.drawing import SERIES, diverging, rgb
 from lab.show.springs import drawn_springs, ground_ends
 
@@ -23,9 +24,6 @@ N_FRAMES = 600
 MAX_NAMED = 20
 """Structures of up to so many bodies carry their names."""
 GROUND = (110, 110, 110)
-FIELD_OF_VIEW = np.radians(55)
-"""Rerun's own, top to bottom."""
-VIEW_FROM = np.array([0.25, -0.85, 0.45]) / np.linalg.norm([0.25, -0.85, 0.45])
 
 
 def motion_frames(motion: Motion, frequency_hz: np.ndarray) -> np.ndarray:
@@ -80,16 +78,9 @@ def time_panel(frequency_hz: np.ndarray, end: float) -> rrb.TimePanel:
 def view(origin: str, name: str, rig: Rig, frames: structure.Frames, *, aspect: float) -> rrb.View:
     """A 3D view from the front, a little from above, far enough to see all in a window of that aspect."""
     points = np.concatenate([frames.position.reshape(-1, 3), *[path.reshape(-1, 3) for path in frames.paths]])
-    center = (points.min(axis=0) + points.max(axis=0)) / 2
-    right = np.cross(-VIEW_FROM, [0.0, 0.0, 1.0])
-    right /= np.linalg.norm(right)
-    across, upward, near = (
-        np.max(np.abs((points - center) @ e)) for e in (right, np.cross(right, -VIEW_FROM), VIEW_FROM)
-    )
-    margin = 0.25 * structure.spacing(rig)
-    distance = near + max(upward + margin, (across + margin) / aspect) / np.tan(FIELD_OF_VIEW / 2)
-    eye = rrb.EyeControls3D(position=center + distance * VIEW_FROM, look_target=center)
-    return rrb.Spatial3DView(origin=origin, name=name, line_grid=False, eye_controls=eye)
+    position, target = eye(points, aspect=aspect, margin=structure.reach(rig))
+    controls = rrb.EyeControls3D(position=position, look_target=target)
+    return rrb.Spatial3DView(origin=origin, name=name, line_grid=False, eye_controls=controls)
 
 
 def log_solids(stream: rr.RecordingStream, origin: str, rig: Rig, *, named: bool) -> None:

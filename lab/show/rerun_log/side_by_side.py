@@ -10,7 +10,7 @@ import rerun.blueprint as rrb
 
 from lab.diagnosis.outcome import Diagnosis, Finding
 from lab.show import structure
-from lab.show.findings import place, words
+from lab.show.findings import words
 from lab.show.places import arcs, places
 from lab.show.rerun_log.scene import (
     MAX_NAMED,
@@ -52,7 +52,7 @@ def log_structures(
         for number, finding in enumerate(diagnosis.findings):
             where = places(rig, finding.effect.location, q)
             entity = join(origin, "findings", str(number))
-            _log_mark(stream, entity, finding, where, structure.spacing(rig), time)
+            _log_mark(stream, entity, finding, where, structure.spacing(rig), time, level=number)
         marked = ", yellow where a finding sits" if diagnosis.findings else ""
         views.append(view(origin, f"{NAMES[name]}, motion × {factor:g}{marked}", rig, frames, aspect=ASPECT))
     return views
@@ -65,8 +65,10 @@ def _log_mark(
     where: np.ndarray,
     spacing: float,
     time: list[rr.TimeColumn],
+    *,
+    level: int,
 ) -> None:
-    """A ball around a point or an arc from end to end, and the name of the finding above; nothing without a place."""
+    """A ball around a point or an arc from end to end, and `level` steps above it the cause; nothing without a place."""
     if where.shape[1] == 2:
         lines = arcs(where, 0.5 * spacing)
         stream.log(entity, rr.LineStrips3D.from_fields(radii=0.02 * spacing, colors=MARK), static=True)
@@ -80,9 +82,9 @@ def _log_mark(
         top = where[:, 0] + np.array([0.0, 0.0, 0.3 * spacing])
     else:
         return
-    label = f"{words(finding.effect.cause)} at {place(finding.effect.location)}"
+    label = words(finding.effect.cause)
     text = rr.Points3D.from_fields(colors=MARK, radii=1e-6, labels=[label], show_labels=True)
     stream.log(f"{entity}/label", text, static=True)
     # The viewer writes a label a little below its point.
-    above = top + np.array([0.0, 0.0, 0.35 * spacing])
+    above = top + np.array([0.0, 0.0, (0.35 + 0.4 * level) * spacing])
     stream.send_columns(f"{entity}/label", time, rr.Points3D.columns(positions=above))

@@ -15,7 +15,7 @@ from lab.show.signals import Spectra, mean_density, upper_frequency
 
 ORIGIN = "/modes/stabilization"
 REJECTED = (SERIES[1], SERIES[3], SERIES[4], SERIES[5], SERIES[0], SERIES[7])
-PER_ROW = 5
+PER_ROW = 3
 """Entries of the legend side by side."""
 FAINT = (120, 120, 120)
 
@@ -26,7 +26,7 @@ def log_stabilization(stream: rr.RecordingStream, result: Result, spectrum: Spec
     if diagram is None or not diagram.frequency_hz.size:
         return []
     top = upper_frequency(result.sample_rate, result.modes.frequency_hz)
-    axes = Axes((0.0, top), (0.0, 1.05 * float(np.max(diagram.orders))), 400.0, 80.0)
+    axes = Axes((0.0, top), (0.0, 1.05 * float(np.max(diagram.orders))), 300.0, 140.0)
     log_axes(stream, ORIGIN, axes)
     _log_spectrum(stream, axes, spectrum)
     _log_modes(stream, axes, result)
@@ -40,7 +40,7 @@ def log_stabilization(stream: rr.RecordingStream, result: Result, spectrum: Spec
         entity = f"{ORIGIN}/{STABLE}" if reason == STABLE else join(ORIGIN, "rejected", reason)
         stream.log(entity, rr.Points2D(points[shown], colors=color, radii=radius), static=True)
         row, column = divmod(number, PER_ROW)
-        place = [[(column + 0.5) * axes.width / PER_ROW, axes.height + 14 + 16 * row]]
+        place = [[(column + 0.5) * axes.width / PER_ROW, axes.height + 14 + 24 * row]]
         text = f"{reason} ({int(own.sum())})"
         key = rr.Points2D(place, colors=color, radii=-4.0, labels=[text], show_labels=True)
         stream.log(f"{ORIGIN}/legend/{number}", key, static=True)
@@ -49,7 +49,7 @@ def log_stabilization(stream: rr.RecordingStream, result: Result, spectrum: Spec
     cut = f"; {beyond} poles lie above {top:.4g} Hz" if beyond else ""
     return [
         plot_view(
-            ORIGIN, name + cut, axes, above=24.0, below=12.0 + 16.0 * (1 + (len(reasons) - 1) // PER_ROW)
+            ORIGIN, name + cut, axes, above=24.0, below=12.0 + 24.0 * (1 + (len(reasons) - 1) // PER_ROW)
         )
     ]
 
