@@ -83,10 +83,15 @@ def pulses(rng: Generator) -> Recording:
 
 
 def random_forces(rng: Generator) -> Recording:
-    """Two records of the founding experiment under white forces, with 5 % noise."""
+    """Two records of 25 s of the founding experiment under white forces, with 5 % noise."""
     system = paper_chain3()
-    forces = [rng.standard_normal((2, 1000)) for _ in range(2)]
+    forces = [rng.standard_normal((2, 500)) for _ in range(2)]
     return with_noise(recorded(system, forces), 0.05, rng)
+
+
+def short_pulses(rng: Generator) -> Recording:
+    """Ten seconds after each pulse, less than the first mode takes to fall to 1 / e, with 4 % noise."""
+    return with_noise(pulse_recording(paper_chain3(), 200), 0.04, rng)
 
 
 def released(rng: Generator) -> Recording:
@@ -110,6 +115,7 @@ CASES = {
     "chain3 random okid_era": Case(
         random_forces, CHAIN3, {"method": "okid_era", "order": 6, "dofs": chain3().dofs}, chain3()
     ),
+    "chain3 short pulse okid_era": Case(short_pulses, CHAIN3, {"method": "okid_era", "order": 6}),
     "chain7 ambient ssi_cov": Case(wind, CHAIN7, {"method": "ssi_cov"}),
     "chain7 ambient ssi_data": Case(wind, CHAIN7, {"method": "ssi_data"}),
     "chain7 ambient next_era": Case(wind, CHAIN7, {"method": "next_era"}),

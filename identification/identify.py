@@ -14,6 +14,7 @@ from identification.explanation import explanation
 from identification.found import Found, matrices_of
 from identification.methods import find_method
 from identification.modes import Modes
+from identification.observer_redraw import observer_scatter
 from identification.output_only import horizon_warning
 from identification.recording import Recording
 from identification.refinement import Refinement, refinement
@@ -221,15 +222,21 @@ def _error_bars(
 ) -> tuple[Modes, SecondOrder | None, tuple[str, ...]]:
     """Modes and matrices with their standard deviations, or the reasons why they have none."""
     modes, notes = found.modes, []
+    wanting = matrices if matrices is not None and matrices.mass_std is None else None
+    if found.realization.method == "okid_era" and len(modes):  # one redraw of the noise serves both
+        try:
+            scatter = observer_scatter(found.recording, found.realization, modes, matrices=wanting)
+        except IdentificationError as error:
+            return modes, matrices, (f"Modes and matrices have no error bars: {error}.",)
+        modes = replace(modes, frequency_std=scatter.frequency, damping_std=scatter.damping)
+        return modes, scatter.matrices or matrices, ()
     try:
         modes = _bars_of_modes(found)
     except IdentificationError as error:
         notes.append(f"The modes have no error bars: {error}.")
-    if matrices is not None and matrices.mass_std is None:
+    if wanting is not None:
         try:
-            matrices = matrices_with_error_bars(
-                found.recording, found.realization, matrices, 2 * len(matrices.dofs)
-            )
+            matrices = matrices_with_error_bars(found.recording, found.realization, wanting)
         except IdentificationError as error:
             notes.append(f"Mass, damping and stiffness have no error bars: {error}.")
     return modes, matrices, tuple(notes)

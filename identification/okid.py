@@ -75,22 +75,50 @@ def okid_era(
         Juang (1992), thesis, eq. (3.10), (3.15), (3.20).
     """
     found = observe(recording, observer=observer)
+    raw = realize(found, recording, order, n_lags=n_lags, form=form, orders=orders)
+    return _with_fitted_inputs(raw, recording)
+
+
+def realize(
+    found: Observer,
+    recording: Recording,
+    order: int | None,
+    *,
+    n_lags: int | None,
+    form: str,
+    orders: Iterable[int] | None,
+) -> Realization:
+    """State space from an observer, with B and D as the observer has them.
+
+    Args:
+        found: the observer.
+        recording: what it observed.
+        order: as for `okid_era`.
+        n_lags: likewise.
+        form: likewise.
+        orders: likewise.
+
+    Returns:
+        Models of all orders.
+
+    Raises:
+        OrderError: an order exceeds what the observer can hold.
+
+    Source: as for `okid_era`.
+    """
     p = found.length
     n_lags = 4 * p + 1 if n_lags is None else n_lags
     Y = MarkovParameters(found.markov(n_lags), recording.dt, recording.inputs, recording.outputs)
-    notes = [found.note]
+    notes: tuple[str, ...] = (found.note,)
     if order is None:
         # Later lags only repeat what the observer holds, so noise would look like its many states.
         shown = min(n_lags, 2 * p + 1 if found.exact or p < 40 else p + 1)
         start = era(replace(Y, values=Y.values[:shown]))
-        order = start.order
-        notes += start.notes
+        order, notes = start.order, (*notes, *start.notes)
     raw = era(Y, order, form=form, orders=orders)
     systems = tuple(_unscaled(system, found) for system in raw.systems)
-    realized = replace(
-        raw, method="okid_era", systems=systems, settings={"observer": p, "n_lags": n_lags} | raw.settings
-    )
-    return _with_fitted_inputs(realized, recording, tuple(notes))
+    settings = {"observer": p, "n_lags": n_lags} | raw.settings
+    return replace(raw, method="okid_era", systems=systems, settings=settings, notes=notes)
 
 
 def _unscaled(system: StateSpace, found: Observer) -> StateSpace:
@@ -102,13 +130,13 @@ def _unscaled(system: StateSpace, found: Observer) -> StateSpace:
     )
 
 
-def _with_fitted_inputs(realized: Realization, recording: Recording, notes: tuple[str, ...]) -> Realization:
+def _with_fitted_inputs(realized: Realization, recording: Recording) -> Realization:
     """The realization with B and D of the chosen order fitted to the recording."""
     longest = max(record.n_samples for record in recording.records)
     radius = np.max(np.abs(np.linalg.eigvals(realized.system.A)))
     if longest * np.log(radius) > 3:
         note = "B and D are those of the observer, since an unstable pole forbids a simulation of the whole record."
-        return replace(realized, notes=(*notes, note))
+        return replace(realized, notes=(*realized.notes, note))
     fitted = fit_inputs(realized.system, recording)
     systems = tuple(fitted if system.n_states == realized.order else system for system in realized.systems)
-    return replace(realized, systems=systems, notes=notes)
+    return replace(realized, systems=systems)

@@ -35,15 +35,20 @@ def residual_std(
     estimate: Callable[[Recording], Array],
     *,
     n_unknowns: int = 0,
+    truth: Array | None = None,
     rng: np.random.Generator | None = None,
 ) -> Array:
     """One standard deviation of an estimate, from tests with the noise of the outputs drawn anew.
+
+    Where the truth of these tests is told, deviations count from it: what noise makes too large on average is part of
+    the error.
 
     Args:
         recording: with measured inputs.
         residuals: what a model leaves of the outputs of each record, shape (n_outputs, n_samples).
         estimate: what is wanted from a recording, shape (n_values,); NaN where it cannot be had.
         n_unknowns: numbers that were fitted to make the residuals small, which is given back to them.
+        truth: what the estimate should be for the model without noise, shape (n_values,); NaN where that is not known.
         rng: source of the phases; the same ones for every call when None, so that a result can be repeated.
 
     Returns:
@@ -75,8 +80,11 @@ def residual_std(
     values = np.array(draws)
     have = np.isfinite(values)
     n = np.maximum(np.sum(have, axis=0), 2)
-    mean = np.sum(values, axis=0, where=have) / n
-    variance = np.sum((values - mean) ** 2, axis=0, where=have) / (n - 1)
+    centre = np.sum(values, axis=0, where=have) / n
+    if truth is not None:
+        known = np.isfinite(truth)
+        centre, n = np.where(known, truth, centre), n + known
+    variance = np.sum((values - centre) ** 2, axis=0, where=have) / (n - 1)
     return np.where(np.mean(have, axis=0) >= 1 - MAY_FAIL, np.sqrt(variance), np.inf)
 
 

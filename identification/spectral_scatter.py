@@ -149,10 +149,32 @@ def spectral_std(
                 "the modes do not come back when the analysis is repeated; take another order"
             )
         model = forced_model(recording, modes, likeliest=True)
-        std = residual_std(recording, model.residuals, estimate, n_unknowns=model.n_unknowns)
+        truth = values_near(modes.poles, model.system.modes())
+        std = residual_std(recording, model.residuals, estimate, n_unknowns=model.n_unknowns, truth=truth)
     else:
         std = jackknife_std(recording, estimate)
     return std[:n], std[n:]
+
+
+def values_near(poles: Complex, modes: Modes) -> Array:
+    """Frequencies [Hz], then damping ratios, of the modes nearest to given poles; NaN where none is near.
+
+    Args:
+        poles: continuous in time [rad/s], shape (n_poles,).
+        modes: each is taken for one pole at most.
+
+    Returns:
+        Shape (2 n_poles,).
+    """
+    from scipy.optimize import linear_sum_assignment  # slow to load
+
+    values = np.full((2, poles.size), np.nan)
+    gap = np.abs(modes.poles - poles[:, None])
+    own, nearest = linear_sum_assignment(gap)
+    near = gap[own, nearest] < LOST * np.abs(poles[own])
+    own, nearest = own[near], nearest[near]
+    values[:, own] = modes.frequency_hz[nearest], modes.damping_ratio[nearest]
+    return values.ravel()
 
 
 def repeat(

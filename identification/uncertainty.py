@@ -1,7 +1,7 @@
 """Error bars: how far modes and matrices may be from the truth, one standard deviation, for every method.
 
 - `era`: the residual's noise, to first order through the Hankel matrix (`pulse_scatter`).
-- `okid_era`: the residual's noise through the observer's regression (`observer_scatter`).
+- `okid_era`: the noise redrawn, and the whole way gone again (`observer_redraw`).
 - `ssi_cov`, `ssi_data`, `next_era`: the record's own randomness, as the mean of a series in time (`covariance_scatter`).
 - `plscf` and `efdd`: the noise redrawn, or pieces left out (`spectral_scatter`).
 - any other method on stationary records: parts left out in turn (`resampling`).
@@ -25,7 +25,7 @@ from identification.errors import IdentificationError
 from identification.matrix_scatter import matrices_with_std
 from identification.methods import find_method
 from identification.modes import Modes
-from identification.observer_scatter import observer_tangent
+from identification.observer_redraw import matrix_model, observer_scatter
 from identification.parameterizations import Tangent
 from identification.pulse_scatter import pulse_tangent
 from identification.recording import Array, Recording
@@ -66,7 +66,7 @@ def modes_with_error_bars(
         TooShortError: too few data to tell.
         IdentificationError: the records or the model allow no error bars; says why.
 
-    Source: as for `pulse_tangent`, `observer_tangent`, `covariance_scatter` and `jackknife_std`.
+    Source: as for `pulse_tangent`, `observer_scatter`, `covariance_scatter` and `jackknife_std`.
     """
     if places is None:
         places = [Placed(realization.order, complex(pole)) for pole in modes.poles]
@@ -75,8 +75,11 @@ def modes_with_error_bars(
     given = dict(settings or {})
     if realization.method in NESTED:
         std = covariance_scatter(recording, realization, places, references=given.get("references"))
-    elif realization.method in ("era", "okid_era"):
+    elif realization.method == "era":
         std = _from_tangents(recording, realization, places)
+    elif realization.method == "okid_era":
+        scatter = observer_scatter(recording, realization, modes, orders=[place.order for place in places])
+        std = scatter.frequency, scatter.damping
     elif realization.method in SPECTRAL:
         std = spectral_std(recording, realization, Tracks.of_places(places), settings=given)
     else:
@@ -85,15 +88,14 @@ def modes_with_error_bars(
 
 
 def matrices_with_error_bars(
-    recording: Recording, realization: Realization, matrices: SecondOrder, order: int
+    recording: Recording, realization: Realization, matrices: SecondOrder
 ) -> SecondOrder:
     """M, C_d and K with the standard deviation of each entry.
 
     Args:
         recording: the one that was realized.
-        realization: by `era` or `okid_era`.
-        matrices: those of its model of the given order.
-        order: number of states.
+        realization: by `era`; for `okid_era` there is `observer_scatter`.
+        matrices: those of `matrix_model`.
 
     Returns:
         The same matrices with their standard deviations.
@@ -102,18 +104,17 @@ def matrices_with_error_bars(
         TooShortError: too few data to tell.
         IdentificationError: the method or the model allows no error bars; says why.
 
-    Source: as for `pulse_tangent` and `observer_tangent`; the derivatives are central differences.
+    Source: as for `pulse_tangent`; the derivatives are central differences.
     """
-    return matrices_with_std(matrices, _tangent(recording, realization, order, inputs=True))
+    order = matrix_model(realization, len(matrices.dofs)).n_states
+    return matrices_with_std(matrices, _tangent(recording, realization, order))
 
 
-def _tangent(recording: Recording, realization: Realization, order: int, *, inputs: bool) -> Tangent:
+def _tangent(recording: Recording, realization: Realization, order: int) -> Tangent:
     if realization.method == "era":
         return pulse_tangent(recording, realization, order)
-    if realization.method == "okid_era":
-        return observer_tangent(recording, realization, order, inputs=inputs)
     raise IdentificationError(
-        f"models of {realization.method!r} have no error bars of M, C and K; take era or okid_era"
+        f"models of {realization.method!r} have no error bars of M, C and K; take era, okid_era or a refinement"
     )
 
 
@@ -122,7 +123,7 @@ def _from_tangents(
 ) -> tuple[Array, Array]:
     std = np.empty((2, len(places)))
     for order in {place.order for place in places}:
-        tangent = _tangent(recording, realization, order, inputs=False)
+        tangent = _tangent(recording, realization, order)
         found = modes_with_std(tangent, np.eye(len(tangent.A_theta)))
         if found.frequency_std is None or found.damping_std is None:
             raise IdentificationError(f"the model of order {order} has no modes; take another order")
