@@ -7,13 +7,13 @@ these known, outputs and direct term follow by linear least squares over the lin
 from __future__ import annotations
 
 from collections.abc import Iterable
-from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
 import scipy.linalg
 from numpy.typing import NDArray
 
+from identification.circle import Circle, all_lines, model_points
 from identification.denominator import coefficients, reduced_factor, zeros
 from identification.errors import OrderError, TooShortError
 from identification.lsfd import fit_outputs, line_weights
@@ -50,15 +50,16 @@ def plscf(
     band, z turns by half a circle from its lower to its upper edge, and a degree then spans more time.
 
     Args:
-        response: to forces held over each sample, or positive spectra of outputs.
+        response: to forces held over each sample, or that vary continuously (`dt` is zero, as an analyser measures
+            it), or positive spectra of outputs.
         order: number of states kept; chosen from the data when None.
         orders: further orders, multiples of the number of inputs when `order` is None.
         degree: highest degree p; what the lines and `MAX_ORDER` allow, at most `MAX_DEGREE`, when None.
         band: lowest and highest frequency fitted [Hz]; all lines and the whole circle when None.
 
     Returns:
-        Models of all orders, and the singular values of the reduced equations, which tell the rank of data
-        without noise.
+        Models of all orders, sampled like the response or continuous, and the singular values of the reduced
+        equations, which tell the rank of data without noise.
 
     Raises:
         OrderError: more states than the polynomial has zeros, or an order that cannot be had.
@@ -68,7 +69,7 @@ def plscf(
     Source: Guillaume, Verboven, Vanlanduit, Van der Auweraer and Peeters (2003), Proc. 21st IMAC; Peeters,
         Van der Auweraer, Guillaume and Leuridan (2004), Shock Vib. 11, 395-409.
     """
-    circle = _Circle(response.dt, *((0.0, 0.5 / response.dt) if band is None else band))
+    circle = Circle(response.dt, *(all_lines(response) if band is None else band))
     if band is not None:
         response = response.between(*band)
     n_f, _, n_inputs = response.values.shape
@@ -78,7 +79,7 @@ def plscf(
     singular_values = scipy.linalg.svdvals(R[:, :-n_inputs])
     settings: dict[str, int | float | str] = {"degree": p, "low_hz": circle.low, "high_hz": circle.high}
     notes: tuple[str, ...] = ()
-    if not asked and band is None and (rank := _rank(R, n_inputs)):
+    if not asked and band is None and response.dt and (rank := _rank(R, n_inputs)):
         asked, order = [rank], rank
         notes = (f"Order {rank} is the rank of the equations, whose singular values end in rounding errors.",)
     settings["poles"] = "all" if order is None else "strongest"
@@ -110,45 +111,17 @@ def response_rank(response: FrequencyResponse) -> int | None:
     """
     thin = response.take(slice(None, None, -(-response.frequency_hz.size // MAX_LINES)))  # any lines show it
     n_f, _, n_inputs = thin.values.shape
-    if n_f < 4:
+    if n_f < 4 or not thin.dt:
         return None
-    R, _ = _reduced(thin, _Circle(thin.dt, 0.0, 0.5 / thin.dt), _highest_degree(n_f, n_inputs, None, []))
+    R, _ = _reduced(thin, Circle(thin.dt, 0.0, 0.5 / thin.dt), _highest_degree(n_f, n_inputs, None, []))
     return _rank(R, n_inputs)
 
 
-def _reduced(response: FrequencyResponse, circle: _Circle, degree: int) -> tuple[Array, Array]:
+def _reduced(response: FrequencyResponse, circle: Circle, degree: int) -> tuple[Array, Array]:
     """The reduced equations, outputs of different units on one scale, and that scale, (n_outputs,)."""
     size = unit_sizes(np.sum(np.abs(response.values) ** 2, axis=(0, 2)), response.outputs)
     weight = line_weights(response)[:, None] / size
     return reduced_factor(response.values, circle.points(response.frequency_hz), weight, degree), size
-
-
-@dataclass(frozen=True)
-class _Circle:
-    """How the lines from `low` to `high` [Hz] lie on the upper half of the unit circle."""
-
-    dt: float
-    low: float
-    high: float
-
-    @property
-    def T(self) -> float:
-        return 0.5 / (self.high - self.low)
-
-    @property
-    def whole(self) -> bool:
-        return self.low == 0 and self.high * self.dt == 0.5
-
-    def points(self, frequency_hz: Array) -> Complex:
-        return np.asarray(np.exp(2j * np.pi * (frequency_hz - self.low) * self.T))
-
-    def sampled_poles(self, z: Complex) -> Complex:
-        """Where the zeros z on this circle lie on that of the sample time; real ones do not oscillate."""
-        if self.whole:
-            return z
-        oscillates = z.imag != 0
-        s = np.log(np.where(oscillates, z, np.abs(z))) / self.T + 2j * np.pi * self.low * oscillates
-        return np.asarray(np.exp(s * self.dt))
 
 
 class _Fit(NamedTuple):
@@ -158,32 +131,34 @@ class _Fit(NamedTuple):
     misfit: Array
 
 
-def _fit(response: FrequencyResponse, circle: _Circle, zeros: Complex, participation: Complex) -> _Fit:
+def _fit(response: FrequencyResponse, circle: Circle, zeros: Complex, participation: Complex) -> _Fit:
     """Model with the given zeros of the denominator as poles, and the outputs that fit best."""
-    z, points = circle.sampled_poles(zeros), np.exp(2j * np.pi * response.frequency_hz * response.dt)
+    z, points = circle.poles(zeros), model_points(response)
     A, B = modal_states(z, participation)
     C, D, misfit = fit_outputs(response, modal_gains(z, participation, points))
     return _Fit(StateSpace(A, B, C, D, response.dt, response.inputs, response.outputs), misfit)
 
 
 def _strongest(
-    response: FrequencyResponse, circle: _Circle, zeros: Complex, participation: Complex, order: int
+    response: FrequencyResponse, circle: Circle, zeros: Complex, participation: Complex, order: int
 ) -> tuple[Complex, Complex]:
     """The decaying poles, `order` states in all, that contribute most to the response."""
     system = _fit(response, circle, zeros, participation).system
-    width, z = widths(zeros), circle.sampled_poles(zeros)
+    width, z = widths(zeros), circle.poles(zeros)
+    decaying = circle.decaying(z)
     first = np.cumsum(width) - width
     shape = np.add.reduceat(np.sum(system.C**2, axis=0), first)  # (n_poles,)
-    points = np.exp(2j * np.pi * response.frequency_hz * response.dt)
-    gain = np.mean(1 / np.abs(points[:, None] - z) ** 2, axis=0) * np.sum(np.abs(participation) ** 2, axis=1)
+    gain = np.mean(1 / np.abs(model_points(response)[:, None] - z) ** 2, axis=0) * np.sum(
+        np.abs(participation) ** 2, axis=1
+    )
     chosen: list[int] = []
     left = order
     for k in np.argsort(-shape * gain, kind="stable"):
-        if np.abs(z[k]) < 1 and width[k] <= left:
+        if decaying[k] and width[k] <= left:
             chosen.append(int(k))
             left -= int(width[k])
     if left:
-        n_decaying = int(np.sum(width[np.abs(z) < 1]))
+        n_decaying = int(np.sum(width[decaying]))
         raise OrderError(
             f"order {order} cannot be made of the {n_decaying} states that decay; "
             "take a lower or an even order, or a higher degree"
@@ -262,7 +237,10 @@ def _shortest_description(fits: list[_Fit], n_values: int, size: Array) -> tuple
 
 
 def _unwindowed(system: StateSpace, decay: float) -> StateSpace:
-    """The model without the exponential window: z → z exp(decay dt)."""
+    """The model without the exponential window: z → z exp(decay dt), or s → s + decay."""
+    if not system.dt:
+        shifted = system.A + decay * np.eye(system.n_states)
+        return StateSpace(shifted, system.B, system.C, system.D, 0.0, system.inputs, system.outputs)
     growth = np.exp(decay * system.dt)
     return StateSpace(
         growth * system.A, growth * system.B, system.C, system.D, system.dt, system.inputs, system.outputs

@@ -368,3 +368,47 @@ def test_positive_spectra_take_the_place_of_responses():
     spectra = positive_spectra(recording, 100, references=["acceleration_x2"])
     found = plscf(spectra, orders=[10, 12])
     assert found.system.inputs == (Channel("acceleration_x2", "m/s^2", "x2"),)
+
+
+def continuous(system, decay=0.0, f=None):
+    """The response of a continuous model at s = 2πi f + decay, as an analyser measures it."""
+    f = 0.02 * np.arange(25, 1000) if f is None else f
+    s = (2j * np.pi * f + decay)[:, None, None] * np.eye(system.n_states)
+    B = np.broadcast_to(system.B, (f.size, *system.B.shape))
+    H = system.C @ np.linalg.solve(s - system.A, B) + system.D
+    return FrequencyResponse(f, H, 0.0, system.inputs, system.outputs, decay=decay)
+
+
+def test_continuous_responses_converge_with_the_degree():
+    """On the circle of a band e^{sT} is no s: polynomials come near to 1 / (s - λ), by a factor with each step of degree."""
+    structure = systems.chain7()
+    truth = systems.instrumented(structure, systems.sensors(("x2", "x5", "x7")), systems.actuators(("x2",)))
+    known = truth.modes()
+    errors = []
+    for degree in (16, 24, 32, 40):
+        found = plscf(continuous(truth), 14, degree=degree).system
+        assert found.dt == 0
+        modes = found.modes()
+        errors.append(float(np.max(np.abs(modes.poles / known.poles - 1))))
+    assert np.all(np.diff(np.log(errors)) < -1)
+    assert errors[-1] < 1e-5
+    shapes = np.diag(mac(modes.shapes, known.shapes))
+    assert np.all(shapes > 1 - 1e-6)
+
+
+def test_the_window_of_continuous_responses_is_undone():
+    structure = systems.chain7()
+    truth = systems.instrumented(structure, systems.sensors(("x2", "x5", "x7")), systems.actuators(("x2",)))
+    plain, windowed = (plscf(continuous(truth, decay), 14).system.modes().poles for decay in (0.0, 0.5))
+    # Left in, the window would have moved every pole by 0.5 rad/s; what is left is the error of the degree.
+    assert np.max(np.abs(windowed - plain)) < 0.05
+
+
+def test_modes_of_noisy_continuous_responses_settle():
+    structure = systems.chain7()
+    truth = systems.instrumented(structure, systems.sensors(("x2", "x5", "x7")), systems.actuators(("x2",)))
+    settled = stabilize(plscf(noisy(continuous(truth), 0.01, 3))).modes
+    known = truth.modes()
+    assert len(settled) == 7
+    # A line has noise of 1 % of the RMS, and some dozens of lines make up a resonance: parts in a thousand of the pole.
+    assert np.max(np.abs(settled.frequency_hz / known.frequency_hz - 1)) < 5e-3
