@@ -135,7 +135,10 @@ def _groups(file: Any) -> list[Any]:
         else []
     )
     if not names and "frequency_responses" in file:
-        raise FileError("holds frequency responses and no samples; expected groups /records/0, /records/1, …")
+        raise FileError(
+            "holds frequency responses and no samples; expected groups /records/0, /records/1, …; in Python, "
+            "identification.plscf(lab.load_responses(FILE)) finds their modes"
+        )
     if not names:
         raise FileError("holds no record; expected groups /records/0, /records/1, …")
     return [records[name] for name in sorted(names, key=int)]
