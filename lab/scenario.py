@@ -87,11 +87,13 @@ class Identification(Table):
         method: name, as in `lab list methods`.
         order: number of states.
         settings: further settings of the method, by name.
+        refine: move modes and matrices to the maximum of the likelihood; needs measured forces, or free decays.
     """
 
     method: str | None = None
     order: PositiveInt | None = None
     settings: dict[str, Any] = {}
+    refine: bool = False
 
 
 class Diagnosing(Table):
@@ -207,7 +209,7 @@ class Scenario(Table):
         update: dict[str, Any] = {} if seed is None else {"seed": seed}
         chosen = self.identification
         if method is not None and method != chosen.method:
-            chosen = Identification(method=method)
+            chosen = Identification(method=method, refine=chosen.refine)
         if order is not None:
             chosen = chosen.model_copy(update={"order": order})
         return self.model_copy(update={**update, "identification": chosen})

@@ -19,6 +19,7 @@ RESULT_KEYS = (
     "truth",
     "comparison",
     "criteria",
+    "validation",
     "warnings",
     "notes",
     "explanation",

@@ -89,7 +89,14 @@ def _tested(scenario: Scenario) -> tuple[dict[str, Any], Score]:
         seed=scenario.seed,
         accuracy=test.accuracy,
     )
-    result = examine(recording, chosen.method, order=chosen.order, dofs=touched(rig), **chosen.settings)
+    result = examine(
+        recording,
+        chosen.method,
+        order=chosen.order,
+        dofs=touched(rig),
+        refine=chosen.refine,
+        **chosen.settings,
+    )
     result = held_against(truth_of(scenario, rig), result, scenario)
     asked = scenario.diagnosis
     if asked is None:
