@@ -58,7 +58,14 @@ def run(
         _record(folder / "recording.h5", rig, scenario, progress)
         recording = load(folder / "recording.h5")
         chosen = scenario.identification
-        result = examine(recording, chosen.method, order=chosen.order, dofs=touched(rig), **chosen.settings)
+        result = examine(
+            recording,
+            chosen.method,
+            order=chosen.order,
+            dofs=touched(rig),
+            refine=chosen.refine,
+            **chosen.settings,
+        )
         result = replace(held_against(truth_of(scenario, rig), result, scenario), title=scenario.title)
         result = _validated(result, recording, scenario)
         if scenario.diagnosis is not None:
