@@ -57,7 +57,8 @@ def listing(kind: str) -> dict[str, str]:
 
 def _first_comment(path: Path) -> str:
     found = re.search(r"<!--(.*?)-->", path.read_text("utf-8"), re.DOTALL)
-    return " ".join(found[1].split()) if found else ""
+    # Which program wrote a model says nothing of the structure.
+    return re.sub(r"^Written by \S+\.py\. ", "", " ".join(found[1].split())) if found else ""
 
 
 def _first_sentence(text: str) -> str:

@@ -290,6 +290,7 @@ def test_list(capsys):
     printed = capsys.readouterr().out
     for name in ("models:", "chain7", "scenarios:", "truss_random", "methods:", "ssi_cov", "effects:"):
         assert name in printed
+    assert re.search(r"^  truss +De Angelis", printed, re.MULTILINE)
     assert status("list", "methods", "--json") == 0
     assert "era" in json.loads(capsys.readouterr().out)["methods"]
 
