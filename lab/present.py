@@ -9,6 +9,7 @@ import numpy as np
 
 from identification.recording import Recording
 from lab.excitation import Excitation, Load, Sampling
+from lab.files.checksum import sha256_of
 from lab.files.results import save_result
 from lab.result import Result
 from lab.rig import Rig
@@ -27,6 +28,7 @@ def present(
     command: str = "",
     scenario: Scenario | None = None,
     rig: Rig | None = None,
+    source: str | Path | None = None,
 ) -> None:
     """Write result.json, report.html and run.rrd into a folder.
 
@@ -37,6 +39,7 @@ def present(
         command: how the lab was called.
         scenario: the test behind it, if there is one.
         rig: the rig behind it, if there is one.
+        source: file that the recording was read from, if it was given.
     """
     # Imported here because drawing is slow to load and `lab` must come up without it.
     from lab.show.report import write_report
@@ -49,10 +52,18 @@ def present(
         recording,
         scenario_text=scenario.text if scenario else "",
         command=command,
-        facts=_facts(recording, rig, scenario),
+        facts=_given(source, scenario) | _facts(recording, rig, scenario),
     )
     moved = _first_swings(rig, scenario) if rig and scenario else None
     write_rrd(folder / "run.rrd", result, recording, rig=rig, motion=moved)
+
+
+def _given(source: str | Path | None, scenario: Scenario | None) -> dict[str, str]:
+    """The files that the result rests on, with their checksums."""
+    files = {} if source is None else {"Recording": Path(source)}
+    if scenario is not None:
+        files["Model file"] = scenario.model_file()
+    return {name: f"{path}, SHA-256 {sha256_of(path)}" for name, path in files.items()}
 
 
 def _facts(recording: Recording, rig: Rig | None, scenario: Scenario | None) -> dict[str, str]:

@@ -103,7 +103,7 @@ def identify_file(
     with output_folder(out, force=force) as folder:
         recording = load(path)
         result = examine(recording, method, order=order, refine=refine, **settings)
-        present(folder, result, recording, command=command)
+        present(folder, result, recording, command=command, source=path)
     return result
 
 
@@ -218,7 +218,11 @@ def _diagnosed(
     recording = replace(recording, title=scenario.title)
     diagnosis = diagnose(recording, model_of(scenario), widths=asked.widths)
     folder.mkdir()
-    facts = {"Scenario": scenario.title, "Model": scenario.model}
+    facts = {
+        "Scenario": f"{scenario.title}; word for word in report.html of the folder above",
+        "Model": scenario.model,
+        "Seed": str(scenario.seed),
+    }
     present_diagnosis(folder, diagnosis, recording, command=command, facts=facts)
     judged = judge_diagnosis(
         diagnosis, scenario.hidden(), verdict=asked.verdict, parameter_error=asked.parameter_error

@@ -5,7 +5,6 @@ The only place that imports jinja2. All that comes from data is escaped.
 
 from __future__ import annotations
 
-import hashlib
 import importlib.metadata
 import platform
 from collections.abc import Iterable
@@ -15,6 +14,7 @@ from typing import Any
 import jinja2
 from markupsafe import Markup
 
+from lab.files.checksum import sha256_of
 from lab.show.figures.canvas import Drawing
 
 PACKAGES = ("virtual-modal-lab", "mujoco", "numpy", "scipy", "h5py")
@@ -57,12 +57,7 @@ def surroundings() -> dict[str, str]:
 
 def checksums(folder: Path, names: Iterable[str]) -> dict[str, str]:
     """SHA-256 of those of the named files that lie in the folder."""
-    found = {}
-    for name in names:
-        if (folder / name).is_file():
-            with (folder / name).open("rb") as file:
-                found[f"SHA-256 of {name}"] = hashlib.file_digest(file, "sha256").hexdigest()
-    return found
+    return {f"SHA-256 of {name}": sha256_of(folder / name) for name in names if (folder / name).is_file()}
 
 
 def _versions(packages: Iterable[str]) -> list[str]:

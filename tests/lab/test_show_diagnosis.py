@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from identification.recording import Channel
-from lab.diagnosis.outcome import Errors, Prediction, Quantity
+from lab.diagnosis.outcome import Errors, Prediction, Quantity, SpectralPrediction
 from lab.diagnosis_summary import diagnosis_summary
 from lab.effects import EFFECTS
 from lab.show.diagnosis_report import write_diagnosis_report
@@ -24,6 +24,7 @@ from lab.show.findings import (
 from lab.show.headline import headline
 from lab.show.model_modes import mode_changes
 from lab.show.rerun_log.diagnosis import write_diagnosis_rrd
+from lab.show.rerun_log.spectra import level_range
 from tests.lab.diagnosed import RATE, explained, recorded, two_masses
 from tests.lab.showcase import motion_of
 from tests.lab.test_show_report import EVIL, Page
@@ -378,3 +379,24 @@ def test_causes_are_ranked_by_evidence(read):
     texts = read.static("/causes/names", "Points2D:labels")
     assert texts[0] == "found: cubic stiffness at spring0_1, 1234"
     assert texts[1] == "instead of the first: bilinear stiffness at spring0_1, 800.2"
+
+
+def test_spectra_are_laid_out_too(diagnosis, recording, tmp_path):
+    """A diagnosis of spectra: the words, the ranked causes, and a plot for each row in decibels."""
+    f = np.linspace(0.5, 25.0, 50)
+    measured = np.stack([np.full(50, 1e-2), np.full(50, 1e-4)])
+    rows = SpectralPrediction(
+        f, measured, 10 * measured, measured, measured, ("acc0.x", "pos1"), ("(m/s^2)^2/Hz", "m^2/Hz")
+    )
+    write_diagnosis_rrd(tmp_path / "run.rrd", replace(diagnosis, spectra=rows), recording)
+    read = Read(tmp_path / "run.rrd")
+    views = read.views()
+    assert [origin for _, origin in views if origin not in read.entities] == []
+    assert sorted(kind for kind, _ in views) == ["2D", "2D", "2D", "TextDocument"]
+    (entity,) = (e for e in read.entities if e.startswith("/spectra/acc0") and e.endswith("curves/1"))
+    as_given = np.array(read.static(entity, "LineStrips2D:strips")[0])
+    (entity,) = (e for e in read.entities if e.startswith("/spectra/acc0") and e.endswith("curves/0"))
+    drawn = np.array(read.static(entity, "LineStrips2D:strips")[0])
+    # Ten times the power is 10 dB, of a frame 80 high over the 30 dB around -20 and -10 dB.
+    low, high = level_range([np.array([-20.0, -10.0])])
+    np.testing.assert_allclose(drawn[:, 1] - as_given[:, 1], 80 * 10 / (high - low), rtol=1e-5)

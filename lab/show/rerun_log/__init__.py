@@ -25,6 +25,7 @@ from lab.show.rerun_log.scene import log_motion, motion_frames, time_panel
 from lab.show.rerun_log.spectra import log_channel_spectra
 from lab.show.rerun_log.stabilization import log_stabilization
 from lab.show.signals import spectra
+from lab.show.tables import validation_rows
 from lab.show.verdict import mode_rows, verdict
 
 if TYPE_CHECKING:
@@ -153,5 +154,11 @@ def _summary(title: str, result: Result) -> str:
         agreement = "" if row.mac is None else f"{row.mac:.4f}"
         own = f"| {row.number} | {row.frequency:.5g} | {100 * row.damping:.4g} |"
         lines.append(own + f" {error} | {agreement} |" * compared)
+    if result.validation:
+        lines += ["", "| Criterion of the field | Required | Reached | Outcome |", "|---|---:|---:|---|"]
+        lines += [
+            f"| {plain(row.name)} | {row.bound} | {row.value} | {row.outcome} |"
+            for row in validation_rows(result)
+        ]
     lines += ["", *[f"- {plain(warning)}" for warning in result.warnings]]
     return "\n".join(lines)
