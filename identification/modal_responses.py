@@ -93,6 +93,8 @@ def output_weights(system: StateSpace, modes: Spectrum, run: Run, initial: Array
 
     Returns:
         Coefficients of the first of the `signals`.
+
+    Source: γ (s - Λ)⁻¹ β in partial fractions, as in `derivative_weights`.
     """
     gamma, beta = _gamma(system, modes), _beta(system, modes, run, initial)[modes.own]
     c = gamma[:, :, None] * beta

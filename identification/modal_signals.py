@@ -151,6 +151,9 @@ def signals(
 
     Yields:
         Where in the record a block lies, and its signals, shape (n_signals, n_block).
+
+    Source: Åström and Wittenmark (1997), Computer-Controlled Systems, 3rd ed., section 2.3, one pole at a time; Van Loan
+        (1978), IEEE Trans. Autom. Control 23(3), 395-404, for d.
     """
     n_inputs, n_samples = run.inputs.shape
     z, h = hold(modes.poles, system.dt, run.dt)
