@@ -54,3 +54,17 @@ def test_a_mistake_is_one_line_and_status_2(done, capsys, tmp_path):
         assert (code, screen.out, screen.err.count("\n")) == (2, "", 1)
         assert told in screen.err
     assert not (tmp_path / "x").exists()
+
+
+def test_another_seed_is_another_study(done, capsys, tmp_path):
+    path, out = done
+    code, screen = said(capsys, path, "--out", out, "--seed", 7, "--json")  # that of the file
+    assert (code, json.loads(screen.out)["failed"]) == (0, 2)
+    code, screen = said(capsys, path, "--out", out, "--seed", 8)
+    assert (code, screen.err.count("\n")) == (2, 1)
+    assert "another seed" in screen.err
+    varied = written(tmp_path, STUDY.replace("repeats = 3", "").replace("[vary]", "[vary]\nseed = [1, 2]"))
+    code, screen = said(capsys, varied, "--out", tmp_path / "x", "--seed", 8)
+    assert (code, screen.err.count("\n")) == (2, 1)
+    assert "varies 'seed' itself" in screen.err
+    assert not (tmp_path / "x").exists()
