@@ -76,6 +76,12 @@ def dof_shapes(result: Result, dofs: Sequence[str]) -> tuple[np.ndarray, np.ndar
     return aligned(shapes), known
 
 
+def shown_modes(result: Result, n_most: int) -> list[int]:
+    """Positions of at most `n_most` modes by rising frequency, those first that stay put over the model orders."""
+    stable_first = sorted(range(len(result.modes)), key=lambda i: not result.stable[i])
+    return sorted(stable_first[:n_most])
+
+
 def within_reach(truth: Modes, modes: Modes) -> Modes:
     """The modes of the truth up to a little above the highest identified one: what a test could have found."""
     top = 1.1 * float(np.max(modes.frequency_hz, initial=0.0))

@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 
 from identification.modes import Modes, mac
 from identification.recording import Channel
-from lab.show.shapes import aligned, displacement_shapes, dof_shapes, shape_table, within_reach
+from lab.show.shapes import aligned, displacement_shapes, dof_shapes, shape_table, shown_modes, within_reach
 from tests.lab.showcase import chain_result, chain_rig
 
 MIXED = ["pos1", "vel2", "acc3.x"]
@@ -76,3 +76,9 @@ def test_true_modes_far_above_the_identified_ones_are_left_out():
     assert len(within_reach(truth, truth)) == 3
     assert len(within_reach(truth, truth.take([0]))) == 1
     assert len(within_reach(truth, truth.take([]))) == 3  # nothing to go by
+
+
+def test_stable_modes_are_shown_before_others():
+    result = replace(chain_result(chain_rig("chain3_coupled", outputs=MIXED)), stable=(False, True, True))
+    assert shown_modes(result, 2) == [1, 2]
+    assert shown_modes(result, 12) == [0, 1, 2]

@@ -20,15 +20,15 @@ def error_bars(result: Result) -> Drawing | None:
     modes = result.modes
     if modes.frequency_std is None or modes.damping_std is None or not len(modes):
         return None
-    estimate = [pair.estimate for pair in result.comparison.pairs] if result.comparison else []
-    compared = bool(estimate)
-    rows = estimate if compared else list(range(len(modes)))
+    pairs = result.comparison.pairs if result.comparison else ()
+    compared = bool(pairs)
+    stable = [i for i in range(len(modes)) if result.stable[i]]
+    rows = [pair.estimate for pair in pairs] if compared else stable or list(range(len(modes)))
     frequency_std, damping_std = modes.frequency_std[rows], modes.damping_std[rows]
     known = np.isfinite(frequency_std) & np.isfinite(damping_std) & (modes.damping_ratio[rows] != 0)
     if not known.any() or not np.any(frequency_std[known] > 0):
         return None
     zero = np.zeros(len(rows))
-    pairs = result.comparison.pairs if result.comparison else ()
     frequency = np.array([pair.frequency_error for pair in pairs]) if compared else zero
     damping = np.array([pair.damping_error for pair in pairs]) if compared else zero
     number = np.array(rows) + 1
@@ -51,6 +51,8 @@ def error_bars(result: Result) -> Drawing | None:
         if compared
         else ", over the identified value: how far the truth may be off."
     )
+    if not compared and len(rows) < len(modes):
+        caption += " Modes that do not stay put over the model orders are left out."
     return drawing("error-bars", 2.3, caption, paint)
 
 

@@ -13,7 +13,7 @@ from identification.systems import SecondOrder
 from lab.result import Result
 from lab.show.drawing import SERIES
 from lab.show.figures.canvas import Drawing, drawing, logarithmic, mark_modes, plain
-from lab.show.shapes import shape_table, within_reach
+from lab.show.shapes import shape_table, shown_modes, within_reach
 from lab.show.signals import Spectra, mean_density, upper_frequency
 
 MAX_SHAPES = 12
@@ -30,7 +30,8 @@ def mode_shapes(result: Result) -> Drawing | None:
     n_points, n_modes = table.estimate.shape
     if not n_points or not n_modes:
         return None
-    n_shown = min(n_modes, MAX_SHAPES)
+    rows = shown_modes(result, MAX_SHAPES)
+    n_shown = len(rows)
     n_columns = min(4 if n_points <= 8 else 2, n_shown)
     n_rows = -(-n_shown // n_columns)
     with_truth = bool(np.isfinite(table.truth).any())
@@ -41,9 +42,10 @@ def mode_shapes(result: Result) -> Drawing | None:
             if number >= n_shown:
                 axes.set_visible(False)
                 continue
-            _stems(axes, table.estimate[:, number], table.truth[:, number])
-            f, z = result.modes.frequency_hz[number], result.modes.damping_ratio[number]
-            axes.set_title(f"{number + 1}: {f:.4g} Hz, {100 * z:.3g} %")
+            row = rows[number]
+            _stems(axes, table.estimate[:, row], table.truth[:, row])
+            f, z = result.modes.frequency_hz[row], result.modes.damping_ratio[row]
+            axes.set_title(f"{row + 1}: {f:.4g} Hz, {100 * z:.3g} %")
             axes.set_ylim(-1.2, 1.2)
             axes.set_yticks([-1, 0, 1])
         bottom = frames[-1]
@@ -59,7 +61,7 @@ def mode_shapes(result: Result) -> Drawing | None:
     caption = f"Mode shapes: displacement at the {points}, largest 1. Bars: real part, dots: imaginary part"
     caption += ", diamonds: true real part." if with_truth else "."
     if n_modes > n_shown:
-        caption += f" The first {n_shown} of {n_modes} modes."
+        caption += f" {n_shown} of {n_modes} modes, those first that stay put over the model orders."
     if n_points > MAX_NAMED:
         caption += (
             f" 1 is {table.labels[0]}, {n_points} is {table.labels[-1]}, in the order of the recording."

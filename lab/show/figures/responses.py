@@ -31,8 +31,8 @@ MAX_RESPONSES = 4
 Look = dict[str, Any]
 MEASURED: Look = {"color": "0.6", "linewidth": 2.0}
 IDENTIFIED: Look = {"color": SERIES[0], "linestyle": (0, (4, 2)), "linewidth": 1.0}
-FINE = 2000
-"""Points of a Nyquist curve."""
+FINE = 1000
+"""Evenly spaced points of a Nyquist curve."""
 
 
 def responses(recording: Recording, spectrum: Spectra, result: Result) -> Drawing | None:
@@ -94,10 +94,17 @@ def nyquist(recording: Recording, spectrum: Spectra, result: Result) -> Drawing 
     if measured is None:
         return None
     pairs = chosen_pairs(recording.inputs, recording.outputs)
-    top = upper_frequency(recording.sample_rate, result.modes.frequency_hz)
+    # Beyond the modes to be trusted noise would fill the picture.
+    stable = result.modes.frequency_hz[np.array(result.stable, dtype=bool)]
+    marked = stable if stable.size else result.modes.frequency_hz
+    top = min(
+        recording.sample_rate / 2, 1.1 * float(np.max(marked, initial=0.0)) or recording.sample_rate / 2
+    )
     shown = (spectrum.frequency_hz <= top) & (spectrum.frequency_hz > 0)
-    system, fine = result.realization.system, np.linspace(spectrum.frequency_hz[shown][0], top, FINE)
-    marked = result.modes.frequency_hz[result.modes.frequency_hz <= top]
+    if not shown.any():
+        return None
+    system, fine = result.realization.system, _fine(result, spectrum.frequency_hz[1], top)
+    numbers = [int(np.flatnonzero(result.modes.frequency_hz == f)[0]) + 1 for f in marked]
 
     def paint(figure: Figure) -> None:
         frames = figure.subplots(-(-len(pairs) // 2), min(2, len(pairs)), squeeze=False)
@@ -107,7 +114,9 @@ def nyquist(recording: Recording, spectrum: Spectra, result: Result) -> Drawing 
             model = _model_response(system, recording.outputs[i], recording.inputs[j], fine)
             if model is not None:
                 axes.plot(model.real, model.imag, label="identified", **{**IDENTIFIED, "linestyle": "-"})
-                _mark_on(axes, system, recording.outputs[i], recording.inputs[j], marked)
+                _mark_on(
+                    axes, _model_response(system, recording.outputs[i], recording.inputs[j], marked), numbers
+                )
             axes.axhline(0, color="0.8", linewidth=0.6, zorder=0)
             axes.axvline(0, color="0.8", linewidth=0.6, zorder=0)
             axes.set_aspect("equal", adjustable="datalim")
@@ -129,17 +138,23 @@ def nyquist(recording: Recording, spectrum: Spectra, result: Result) -> Drawing 
     return drawing("nyquist", 0.3 + 2.8 * -(-len(pairs) // 2), caption, paint)
 
 
-def _mark_on(axes: Axes, system: StateSpace, output: Channel, drive: Channel, frequency: np.ndarray) -> None:
+def _fine(result: Result, low: float, high: float) -> np.ndarray:
+    """Frequencies [Hz] that leave no corner in a Nyquist plot: even ones, and even angles on the circle of each mode."""
+    even = np.tan(np.linspace(-1.5, 1.5, 120))
+    around = result.modes.frequency_hz[:, None] * (1 + np.abs(result.modes.damping_ratio)[:, None] * even)
+    whole = np.concatenate([np.linspace(low, high, FINE), around.ravel()])
+    return np.unique(whole[(whole >= low) & (whole <= high)])
+
+
+def _mark_on(axes: Axes, H: np.ndarray | None, numbers: Sequence[int]) -> None:
     """Circles where the curve passes the natural frequencies, numbered where there are few."""
-    H = _model_response(system, output, drive, frequency) if frequency.size else None
-    if H is None:
+    if H is None or not H.size:
         return
     axes.plot(H.real, H.imag, linestyle="", marker="o", markersize=4.5, markerfacecolor="none", color="black")
-    if frequency.size <= MAX_LINES:
-        for number, point in enumerate(H, start=1):
-            axes.annotate(
-                str(number), (point.real, point.imag), xytext=(3, 3), textcoords="offset points", fontsize=7.0
-            )
+    for number, point in zip(numbers, H, strict=True) if len(numbers) <= MAX_LINES else ():
+        axes.annotate(
+            str(number), (point.real, point.imag), xytext=(3, 3), textcoords="offset points", fontsize=7.0
+        )
 
 
 def coherences(recording: Recording, spectrum: Spectra, result: Result) -> Drawing | None:

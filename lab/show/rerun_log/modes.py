@@ -13,7 +13,7 @@ from lab.show import structure
 from lab.show.drawing import SERIES, Axes, rgb
 from lab.show.rerun_log.plot import AXIS, log_axes, plain, plot_view
 from lab.show.rerun_log.scene import TIMELINE, log_frames, log_solids, view
-from lab.show.shapes import aligned, displacement_shapes, dof_shapes
+from lab.show.shapes import aligned, displacement_shapes, dof_shapes, shown_modes
 
 if TYPE_CHECKING:
     from lab.rig import Rig
@@ -48,7 +48,7 @@ def log_modes(stream: rr.RecordingStream, result: Result, rig: Rig | None, end: 
         rig: the structure, or None to plot shapes over channels.
         end: time [s] up to which the modes keep swinging on the time line of the test.
     """
-    shown = _shown(result)
+    shown = shown_modes(result, MAX_MODES)
     if rig is not None:
         shapes, known = dof_shapes(result, rig.dofs)
         if known.any():
@@ -61,12 +61,6 @@ def log_modes(stream: rr.RecordingStream, result: Result, rig: Rig | None, end: 
         *[_log_shape(stream, result, aligned(shapes)[:, i], names, i) for i in shown],
         _log_names(stream, names),
     ]
-
-
-def _shown(result: Result) -> list[int]:
-    """At most `MAX_MODES` modes by rising frequency: the stable ones first."""
-    stable_first = sorted(range(len(result.modes)), key=lambda i: not result.stable[i])
-    return sorted(stable_first[:MAX_MODES])
 
 
 def _name(result: Result, i: int) -> str:
