@@ -18,11 +18,15 @@ from identification.observer_redraw import observer_scatter
 from identification.output_only import horizon_warning
 from identification.recording import Recording
 from identification.refinement import Refinement, refinement
+from identification.response_methods import RESPONSE_METHODS
 from identification.settled import NESTED, brief_warnings, settle
 from identification.spectral_scatter import SPECTRAL, spectral_std
 from identification.stability import Stabilization, stabilize
 from identification.systems import Realization, SecondOrder
 from identification.uncertainty import Placed, matrices_with_error_bars, modes_with_error_bars
+
+HANKEL = (*NESTED, *(name for name in RESPONSE_METHODS if name != "era_dc"))
+"""Methods whose horizon is the block rows and columns of one Hankel matrix."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -119,7 +123,7 @@ def identify(
     warnings = (
         *_order_warnings(realization, modes),
         *(brief_warnings(modes, brief) if brief and not refined else ()),
-        *(horizon_warning(modes, realization) if name in (*NESTED, "era") else ()),
+        *(horizon_warning(modes, realization) if name in HANKEL else ()),
         *(() if refined else _length_warnings(recording, realization, modes)),
         *doubts,
     )

@@ -4,17 +4,23 @@ from __future__ import annotations
 
 import inspect
 from collections.abc import Callable, Iterable
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import Any
 
-from identification.era import era
 from identification.errors import IdentificationError
 from identification.fdd import efdd
 from identification.frequency_domain import plscf_recording
 from identification.next_era import next_era
 from identification.okid import okid_era
-from identification.pulse import markov_parameters
 from identification.recording import Recording
+from identification.response_methods import (
+    around_the_order,
+    era_dc_recording,
+    era_recording,
+    itd_recording,
+    mmrtd_recording,
+    mrtd_recording,
+)
 from identification.ssi import ssi_cov
 from identification.ssi_data import ssi_data
 from identification.systems import Realization
@@ -67,42 +73,6 @@ class Method:
         return self.function(recording, order, **settings)
 
 
-def era_recording(
-    recording: Recording,
-    order: int | None = None,
-    *,
-    orders: Iterable[int] | None = None,
-    form: str = "balanced",
-    n_rows: int | None = None,
-    n_columns: int | None = None,
-) -> Realization:
-    """Models from unit pulses or free decays: `markov_parameters`, then `era` at every order.
-
-    Args:
-        recording: records of kind `pulse` or `free_decay`.
-        order: number of states; chosen from the singular values when None.
-        orders: further orders; when both are None and there is noise, up to twice the order chosen.
-        form: as for `era`.
-        n_rows: as for `era`.
-        n_columns: as for `era`.
-
-    Returns:
-        Models of all orders, and the singular values of the Hankel matrix.
-
-    Raises:
-        RecordingError: the records are neither pulses nor free decays.
-        OrderError: an order exceeds the rank of the data.
-
-    Source: Juang and Pappa (1985), J. Guidance 8(5).
-    """
-    markov = markov_parameters(recording)
-
-    def realize(order: int | None, orders: Iterable[int] | None) -> Realization:
-        return era(markov, order, form=form, n_rows=n_rows, n_columns=n_columns, orders=orders)
-
-    return _around_the_order(realize, order, orders)
-
-
 def okid_era_recording(
     recording: Recording,
     order: int | None = None,
@@ -134,37 +104,7 @@ def okid_era_recording(
     def realize(order: int | None, orders: Iterable[int] | None) -> Realization:
         return okid_era(recording, order, observer=observer, n_lags=n_lags, form=form, orders=orders)
 
-    return _around_the_order(realize, order, orders)
-
-
-def _around_the_order(
-    realize: Callable[[int | None, Iterable[int] | None], Realization],
-    order: int | None,
-    orders: Iterable[int] | None,
-) -> Realization:
-    """Models of the orders asked for, or of the order that the data show and a sweep around it."""
-    found = realize(order, orders)
-    if order is not None or orders is not None or shows_rank(found):
-        return found
-    highest = min(max(2 * found.order, found.order + 6), found.singular_values.size)
-    swept = realize(found.order, range(2, highest + 1, 2))
-    return replace(swept, notes=(*found.notes, f"Orders 2, 4, … {highest} tell whether its modes stay put."))
-
-
-def shows_rank(realization: Realization) -> bool:
-    """Whether the data are calculated ones, whose singular values end in rounding errors after the order.
-
-    The best converters resolve 24 bits, 6e-8 of their range; nothing measured falls by a factor of 1000 to
-    below 1e-8.
-
-    Args:
-        realization: with its singular values.
-
-    Returns:
-        True for data without noise.
-    """
-    s, n = realization.singular_values, realization.order
-    return bool(n < s.size and s[n] <= 1e-8 * s[0] and s[n - 1] >= 1e3 * s[n])
+    return around_the_order(realize, order, orders)
 
 
 METHODS = {
@@ -185,6 +125,38 @@ METHODS = {
             finds_order=True,
             kinds=("impact", "random", "burst_random", "sweep", "multisine", "other"),
             summary="Observer and eigensystem realization, from any forces and the response to them.",
+        ),
+        Method(
+            name="era_dc",
+            function=era_dc_recording,
+            needs_inputs=False,
+            finds_order=True,
+            kinds=("pulse", "free_decay"),
+            summary="Eigensystem realization of data correlations, from the response to pulses or from free decays.",
+        ),
+        Method(
+            name="itd",
+            function=itd_recording,
+            needs_inputs=False,
+            finds_order=True,
+            kinds=("pulse", "free_decay"),
+            summary="Ibrahim time domain, from the response to pulses or from free decays.",
+        ),
+        Method(
+            name="mrtd",
+            function=mrtd_recording,
+            needs_inputs=False,
+            finds_order=True,
+            kinds=("pulse", "free_decay"),
+            summary="Multiple-reference time domain, which is eigensystem realization in output-normal form.",
+        ),
+        Method(
+            name="mmrtd",
+            function=mmrtd_recording,
+            needs_inputs=False,
+            finds_order=True,
+            kinds=("pulse", "free_decay"),
+            summary="Modified multiple-reference time domain, which is the same in input-normal form.",
         ),
         Method(
             name="ssi_cov",

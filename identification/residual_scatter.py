@@ -77,7 +77,21 @@ def residual_std(
             for record, e in zip(recording.records, residuals, strict=True)
         )
         draws.append(estimate(replace(recording, records=records)))
-    values = np.array(draws)
+    return deviation(np.array(draws), truth)
+
+
+def deviation(values: Array, truth: Array | None = None) -> Array:
+    """One standard deviation of estimates from tests that were drawn, from their truth, or from their mean.
+
+    Args:
+        values: shape (n_draws, n_values); NaN where an estimate could not be had.
+        truth: shape (n_values,); NaN where it is not known.
+
+    Returns:
+        Shape (n_values,); infinite where more than a share `MAY_FAIL` of the tests do not give the estimate.
+
+    Source: Efron and Tibshirani (1993), An Introduction to the Bootstrap, eq. (6.6); from the truth, eq. (10.1) added.
+    """
     have = np.isfinite(values)
     n = np.maximum(np.sum(have, axis=0), 2)
     centre = np.sum(values, axis=0, where=have) / n

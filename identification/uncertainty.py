@@ -4,7 +4,7 @@
 - `okid_era`: the noise redrawn, and the whole way gone again (`observer_redraw`).
 - `ssi_cov`, `ssi_data`, `next_era`: the record's own randomness, as the mean of a series in time (`covariance_scatter`).
 - `plscf` and `efdd`: the noise redrawn, or pieces left out (`spectral_scatter`).
-- any other method on stationary records: parts left out in turn (`resampling`).
+- `era_dc`, `itd`, `mrtd`, `mmrtd`: the noise redrawn, and the way to the modes gone again (`response_redraw`).
 
 Over repeated tests the truth lies within ±2 of them about 95 % of the time, as long as the method itself has no
 bias to speak of. Without noise they are zero or of the size of rounding. The scatter of a mode over model
@@ -23,13 +23,12 @@ from identification.covariance_scatter import covariance_scatter
 from identification.error_bars import modes_with_std
 from identification.errors import IdentificationError
 from identification.matrix_scatter import matrices_with_std
-from identification.methods import find_method
 from identification.modes import Modes
 from identification.observer_redraw import matrix_model, observer_scatter
 from identification.parameterizations import Tangent
 from identification.pulse_scatter import pulse_tangent
 from identification.recording import Array, Recording
-from identification.resampling import jackknife_std
+from identification.response_redraw import response_scatter
 from identification.settled import NESTED
 from identification.spectral_scatter import SPECTRAL, Tracks, spectral_std
 from identification.systems import Realization, SecondOrder
@@ -66,7 +65,8 @@ def modes_with_error_bars(
         TooShortError: too few data to tell.
         IdentificationError: the records or the model allow no error bars; says why.
 
-    Source: as for `pulse_tangent`, `observer_scatter`, `covariance_scatter` and `jackknife_std`.
+    Source: as for `pulse_tangent`, `observer_scatter`, `covariance_scatter`, `spectral_std` and
+        `response_scatter`.
     """
     if places is None:
         places = [Placed(realization.order, complex(pole)) for pole in modes.poles]
@@ -83,7 +83,7 @@ def modes_with_error_bars(
     elif realization.method in SPECTRAL:
         std = spectral_std(recording, realization, Tracks.of_places(places), settings=given)
     else:
-        std = _from_parts(recording, realization, places, given)
+        std = tuple(response_scatter(recording, realization, places))
     return replace(modes, frequency_std=std[0], damping_std=std[1])
 
 
@@ -130,29 +130,4 @@ def _from_tangents(
         for k in (k for k, place in enumerate(places) if place.order == order):
             nearest = int(np.argmin(np.abs(found.poles - places[k].pole)))
             std[:, k] = found.frequency_std[nearest], found.damping_std[nearest]
-    return std[0], std[1]
-
-
-def _from_parts(
-    recording: Recording, realization: Realization, places: Sequence[Placed], given: Mapping[str, Any]
-) -> tuple[Array, Array]:
-    """By leaving parts out, with the same horizon and the same orders."""
-    method = find_method(realization.method)
-    fixed = {name: value for name, value in realization.settings.items() if name in method.settings}
-    fixed |= {name: value for name, value in given.items() if name != "orders"}
-    orders = sorted({place.order for place in places})
-
-    def estimate(part: Recording) -> Array:
-        found = method(part, orders[-1], orders=orders, **fixed)
-        values = np.full((2, len(places)), np.nan)
-        for k, (order, pole) in enumerate(places):
-            modes = found.at(order).modes() if order in found.orders else None
-            if modes is None or not len(modes):
-                continue
-            nearest = int(np.argmin(np.abs(modes.poles - pole)))
-            if abs(modes.poles[nearest] - pole) < 0.2 * abs(pole):
-                values[:, k] = modes.frequency_hz[nearest], modes.damping_ratio[nearest]
-        return values.ravel()
-
-    std = jackknife_std(recording, estimate).reshape(2, -1)
     return std[0], std[1]

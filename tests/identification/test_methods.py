@@ -7,14 +7,19 @@ import numpy as np
 import pytest
 
 from identification.errors import IdentificationError, RecordingError
-from identification.methods import METHODS, find_method, shows_rank
+from identification.methods import METHODS, find_method
 from identification.recording import KINDS, Recording
+from identification.response_methods import shows_rank
 from identification.systems import Realization
 from tests.ambient import ambient, output_record
 from tests.systems import chain3, chain7, noisy, paper_chain3, pulse_recording, recorded
 
 KIND_OF = {
     "era": "pulse",
+    "era_dc": "pulse",
+    "itd": "pulse",
+    "mrtd": "pulse",
+    "mmrtd": "pulse",
     "okid_era": "random",
     "ssi_cov": "ambient",
     "ssi_data": "ambient",
@@ -75,7 +80,8 @@ def test_it_ignores_no_setting(method):
 
 def test_an_unknown_name_is_told_with_those_that_exist():
     with pytest.raises(
-        IdentificationError, match=r"'eera' does not exist; there are era, okid_era, ssi_cov, ssi_data"
+        IdentificationError,
+        match=r"'eera' does not exist; there are era, okid_era, era_dc, itd, mrtd, mmrtd, ssi_cov",
     ):
         find_method("eera")
 

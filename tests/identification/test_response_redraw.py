@@ -1,0 +1,74 @@
+"""Error bars of the methods that realize pulse responses, against those of ERA and of repeated tests."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from identification.identify import identify
+from identification.methods import METHODS
+from identification.recording import Record
+from identification.residual_scatter import DRAWS
+from identification.response_methods import RESPONSE_METHODS
+from identification.response_redraw import response_scatter
+from tests.systems import noisy, paper_chain3, pulse_recording
+
+TRUTH = paper_chain3().modes()
+
+
+def with_noise(level, seed, n_samples=200):
+    rng = np.random.default_rng(seed)
+    clean = pulse_recording(paper_chain3(), n_samples)
+    records = tuple(Record(r.kind, r.inputs, noisy(r.outputs, level, rng)) for r in clean.records)
+    return replace(clean, records=records)
+
+
+def test_all_of_them_are_methods_of_a_recording():
+    assert RESPONSE_METHODS.keys() <= METHODS.keys()
+
+
+@pytest.mark.parametrize("name", ["itd", "mrtd", "mmrtd"])
+def test_every_mode_and_matrix_has_an_error_bar_that_holds(name):
+    found = identify(with_noise(0.01, 0), name, order=6)
+    for values, truth, std in (
+        (found.modes.frequency_hz, TRUTH.frequency_hz, found.modes.frequency_std),
+        (found.modes.damping_ratio, TRUTH.damping_ratio, found.modes.damping_std),
+    ):
+        # Six figures of one test: beyond four of their standard deviations once in thousands.
+        assert np.all(np.abs(values - truth) < 4 * std)
+        # Less than a few percent of noise can tell is no honest bar, nor is more than a tenth.
+        assert np.all((std > 1e-5) & (std < 0.1 * truth))
+    assert found.second_order is not None
+    assert np.all(found.second_order.mass_std > 0)
+
+
+def test_normal_forms_scatter_as_era_does():
+    recording = with_noise(0.01, 1)
+    size = {"n_rows": 60, "n_columns": 80}
+    plain = identify(recording, "era", order=6, **size).modes
+    # MRTD is ERA in output-normal form, and MMRTD in input-normal form: the same poles, and the same draws.
+    mrtd, mmrtd = (identify(recording, name, order=6, **size).modes for name in ("mrtd", "mmrtd"))
+    np.testing.assert_allclose(mrtd.frequency_hz, plain.frequency_hz, rtol=1e-9)
+    np.testing.assert_allclose(mrtd.damping_std, mmrtd.damping_std, rtol=1e-6)
+    # Draws tell a deviation to 1 / √(2 · 24) = 14 %, ERA's own 200 draws to 5 %: four of both.
+    for name in ("frequency_std", "damping_std"):
+        ratio = getattr(mrtd, name) / getattr(plain, name)
+        assert np.all(np.abs(np.log(ratio)) < 4 * np.hypot(1 / np.sqrt(2 * DRAWS), 0.05))
+
+
+def test_without_noise_the_bars_are_rounding():
+    recording = pulse_recording(paper_chain3(), 200)
+    found = METHODS["mrtd"](recording, 6)
+    places = [(6, complex(pole)) for pole in found.system.modes().poles]
+    assert np.max(response_scatter(recording, found, places)) < 1e-9
+
+
+def test_a_mode_is_read_at_the_order_where_it_stands():
+    recording = with_noise(0.01, 2)
+    found = METHODS["mrtd"](recording, 6, orders=[6, 8])
+    pole = complex(found.at(6).modes().poles[0])
+    low, high = (response_scatter(recording, found, [(order, pole)]) for order in (6, 8))
+    assert np.all(np.isfinite(low))
+    assert not np.array_equal(low, high)
