@@ -47,7 +47,7 @@ MOST_FINDINGS = 4
 UNSETTLED = 30.0
 """-2 log posterior by which a fit must fall to be taken for one that had not converged."""
 LAW_SUBSTEPS = 12
-"""Substeps of further searches where a law was found, so that its numerics are not taken for another cause."""
+"""Substeps where the model has a law or one was found, so that its numerics are not taken for another cause."""
 FINE_SUBSTEPS = 24
 """Substeps of the last fits, where the numerics must not be mistaken for physics."""
 
@@ -122,6 +122,8 @@ def diagnose(
         model, parameters = twin(rig), _tightened(parameters, known.fit)
     misfit = with_starts(Misfit.of(recording, model, parameters), free_decays(recording))
     misfit = replace(misfit, colour=known.colour if known else 1.0)
+    if model.plant.laws:
+        misfit = replace(misfit, substeps=LAW_SUBSTEPS)
     tell("calibrating")
     calibration = calibrate(misfit, rig)
     found = calibration.fit
@@ -131,14 +133,13 @@ def diagnose(
     left = whiteness(state.fit.residual, inputs)
     while len(state.accepted) < MOST_FINDINGS:
         tell("searching for causes" if not state.accepted else f"searching on, {len(state.accepted)} found")
-        candidates, screened = search(state.calibration, state.fit, effects)
+        candidates, threshold = search(state.calibration, state.fit, effects)
         if candidates:
             better = settled(state.misfit, state.fit, candidates[0].fit)
             if better.objective < state.fit.objective - UNSETTLED:
                 state = _settled(state, better, rig)
-                candidates, screened = search(state.calibration, state.fit, effects)
+                candidates, threshold = search(state.calibration, state.fit, effects)
         first = first or candidates
-        threshold = evidence_threshold(len(screened))
         if not candidates or candidates[0].gain < threshold:
             break
         state = _with(state, candidates[0], rig)
@@ -153,15 +154,6 @@ def diagnose(
     state = _finely(_without_idle(state))
     left = whiteness(state.fit.residual, inputs)
     return _outcome(state, recording, nominal, rig, first, left, known)
-
-
-def evidence_threshold(looks: int) -> float:
-    """2 log evidence that a cause must gain to be named when so many were looked at.
-
-    Each cause pays log n per variable already (Schwarz 1978); the largest of many chance gains is covered by their number
-    (Bonferroni), and a factor e⁵, decisive on Jeffreys' scale, is asked beyond.
-    """
-    return 2 * float(np.log(max(looks, 1))) + 10
 
 
 def _connected(rig: Rig, recording: Recording) -> Rig:

@@ -22,14 +22,14 @@ def minus_two_log_evidence(fit: Fit, *, free: Array | None = None) -> float:
 
     Args:
         fit: a converged fit.
-        free: a direction among the parameters whose prior is lifted: "this one is wrong" without any refit, since a second
-            factor beside the parameter would be degenerate with it.
+        free: a direction among the parameters, or several as rows, whose prior is lifted: "this one is wrong" without any
+            refit, since a second factor beside the parameter would be degenerate with it.
     """
     n, total = fit.theta.size, fit.residual.size
     information, theta, prior = _of_parameters(fit.information, n), fit.theta, fit.precision
     lifted = [np.linalg.eigh(prior)[1][:, k] for k in np.flatnonzero(np.linalg.eigvalsh(prior) < 0.5)]
     if free is not None:
-        lifted.append(free / np.linalg.norm(free))
+        lifted += [row / np.linalg.norm(row) for row in np.atleast_2d(free)]
     loose = np.array(lifted).reshape(-1, n).T  # directions without a prior
     held = scipy.linalg.null_space(loose.T) if loose.size else np.eye(n)
     best = np.inf

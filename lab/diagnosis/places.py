@@ -33,14 +33,15 @@ def mends(
 
 def echoes(hypothesis: Hypothesis, found: Sequence[Hypothesis], survey: Survey) -> bool:
     """Whether a tone has the frequency of one that was found."""
-    frequency = _tone(hypothesis)
+    frequency = tone(hypothesis)
     return frequency is not None and any(
         other is not None and abs(frequency - other) < RESOLUTION / survey.duration
-        for other in map(_tone, found)
+        for other in map(tone, found)
     )
 
 
-def _tone(hypothesis: Hypothesis) -> float | None:
+def tone(hypothesis: Hypothesis) -> float | None:
+    """Frequency of a tone [Hz]; None for any other cause."""
     effect = hypothesis.effect
     if effect.cause not in ("line_hum", "unmeasured_force"):
         return None

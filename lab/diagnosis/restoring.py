@@ -62,9 +62,13 @@ class Restoring:
 
 
 def restoring_force(diagnosis: Diagnosis, recording: Recording) -> Restoring | None:
-    """The first finding that is a law of a spring, seen in the first record; None where there is none, or no linear rest."""
+    """The first finding that is a law of a spring, seen in the first record that is driven from rest.
+
+    None where there is no such finding or record, or no linear rest.
+    """
     named = [f for f in diagnosis.findings if f.effect.cause in OVER]
-    if not named or not diagnosis.predictions or not recording.inputs:
+    driven = [i for i, record in enumerate(recording.records) if record.inputs.shape[0]]
+    if not named or not diagnosis.predictions or not driven:
         return None
     finding = named[0]
     try:
@@ -76,14 +80,15 @@ def restoring_force(diagnosis: Diagnosis, recording: Recording) -> Restoring | N
         return None
     over = OVER[finding.effect.cause]
     dt = recording.dt
-    y = diagnosis.predictions[0].measured[:, :MOST_SAMPLES]
+    predicted = diagnosis.predictions[driven[0]]
+    y = predicted.measured[:, :MOST_SAMPLES]
     n = y.shape[1]
-    u = np.asarray(recording.records[0].inputs[:, :n])
+    u = np.asarray(recording.records[driven[0]].inputs[:, :n])
     law_motion, law_force = _law(diagnosis, plant, row, u, dt)
     e = y - ready(plant, dt).outputs(u, n)
     noise = np.array([diagnosis.noise[c.name].value for c in recording.outputs if c.name in diagnosis.noise])
     if noise.size != len(y) or not np.all(noise > 0):
-        noise = np.nanstd(y - diagnosis.predictions[0].extended[:, :n], axis=1)
+        noise = np.nanstd(y - predicted.extended[:, :n], axis=1)
     weight = np.where(np.isnan(e), 0.0, 1 / np.where(noise > 0, noise, 1.0)[:, None])
     force = _deconvolved(-_kernel(plant, row, dt, n), np.nan_to_num(e), weight, float(np.std(law_force)))
     pushed = _moving(plant, row)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
@@ -9,12 +10,13 @@ import numpy as np
 
 from identification.recording import Array
 from lab.diagnosis.calibrate import Calibration
+from lab.diagnosis.chance import NO_CHANCE, Chance, quantile
 from lab.diagnosis.changes import large_changes
 from lab.diagnosis.evidence import minus_two_log_evidence
 from lab.diagnosis.fit import POOL, Fit, cause_slopes, fit, moved_by, objective, theta_slopes, weights
 from lab.diagnosis.misfit import Hypothesis, Misfit
 from lab.diagnosis.observer import kalman_gain
-from lab.diagnosis.places import echoes, mends
+from lab.diagnosis.places import echoes, mends, tone
 from lab.effects.effect import EVERYWHERE, Effect
 
 OWN_PARAMETERS = {"mass": "mass_change", "stiffness": "stiffness_change", "damping": "damping_change"}
@@ -25,6 +27,8 @@ REFITTED, PER_CAUSE, POLISHED = 10, 2, 3
 KEPT = 5
 """Candidates kept after each stage of their refits, besides those that are as good within `CLOSE`."""
 CLOSE = 30.0
+SUSPECTS = 4
+"""Parameters that may hide one another."""
 NEGLIGIBLE = 1e-3
 """Unknown force, as a share of the inertia forces, that nobody would miss in a model."""
 
@@ -40,6 +44,7 @@ class Candidate:
         gain: 2 log evidence gained over the model without it.
         guided: the fit on its way, while measurements still guided the state.
         direction: among the model's parameters, for a change of what the model has already.
+        beside: direction of a second such change without which this one does not show; the gain is what this one adds to it.
     """
 
     cause: str
@@ -48,6 +53,7 @@ class Candidate:
     gain: float
     direction: Array | None = None
     guided: Fit | None = None
+    beside: Array | None = None
 
 
 _Start = tuple[Hypothesis, Array, Array, float, float]
@@ -82,8 +88,11 @@ def screen(
     present: Sequence[Hypothesis],
     observer: Array,
     proposed: Sequence[Hypothesis],
-) -> list[Screened]:
-    """Hypotheses by falling score: the likelihood gained in a few steps, less the price of their variables."""
+) -> tuple[list[Screened], Array]:
+    """Hypotheses by falling score: the likelihood gained in a few steps, less the price of their variables.
+
+    Beside them, the best score that each of many draws of mere noise would have given.
+    """
     n_train = tuple(min(n, SCREEN_SAMPLES) for n in misfit.n_train)
     e = misfit.residual(theta, present, observer=observer, n_train=n_train)
     slopes = np.concatenate(
@@ -101,6 +110,7 @@ def screen(
     prior = np.zeros((size, size))
     prior[:n, :n] = P
     H = np.linalg.pinv(J @ J.T + prior, rcond=1e-13, hermitian=True)
+    chance = Chance(e.shape, sum(misfit.n_train) * len(e))
 
     def projected(r: Array) -> tuple[Array, float]:
         """Residual less what the model's parameters can explain of it, and its objective."""
@@ -108,60 +118,65 @@ def screen(
         left = r + np.tensordot(d, slopes, axes=1)
         return left, objective(left, theta + d[:n], P, colour)
 
-    def advanced(started: _Start, steps: int) -> _Start:
-        """A start after a few Gauss-Newton steps on its own variables."""
-        h, r, left, f, damping = started
-        for _ in range(steps if h.n else 0):
-            if not np.isfinite(f):
-                break
-            own = cause_slopes(misfit, theta, [*present, h], observer, r, n_train)[-h.n :]
-            if not np.all(np.isfinite(own)):
-                break
-            own = np.array(
-                [x - np.tensordot(H @ (J @ (x * w[:, None]).ravel()), slopes, axes=1) for x in own]
-            )
-            v = weights(left, colour)
-            A = (own * v[:, None]).reshape(h.n, -1)
-            G, g = A @ A.T, A @ (left * v[:, None]).ravel()
-            if not np.trace(G) > 0:
-                break
-            for _ in range(4):
-                step = -np.linalg.solve(
-                    G + (damping * np.diag(np.diag(G)) + 1e-9 * np.trace(G) * np.eye(h.n)), g
-                )
-                (trial,) = moved_by([h], step)
-                trial_r = misfit.residual(theta, [*present, trial], observer=observer, n_train=n_train)
-                trial_left, trial_f = projected(trial_r)
-                if trial_f < f:
-                    break
-                damping = max(damping, 1e-2) * 10
-            else:
-                break
-            gained = f - trial_f
-            h, r, left, f, damping = trial, trial_r, trial_left, trial_f, damping / 5
-            if gained < 1:
-                break
-        return h, r, left, f, damping
+    def own_slopes(h: Hypothesis, r: Array) -> Array:
+        """Slopes of the residual by a hypothesis' own variables, with what the model's parameters can explain projected out."""
+        own = cause_slopes(misfit, theta, [*present, h], observer, r, n_train)[-h.n :]
+        return np.array([x - np.tensordot(H @ (J @ (x * w[:, None]).ravel()), slopes, axes=1) for x in own])
 
-    def start(h: Hypothesis) -> _Start:
-        r = misfit.residual(theta, [*present, h], observer=observer, n_train=n_train)
-        return h, r, *projected(r), 1e-2
+    def stepped(started: _Start, own: Array) -> _Start:
+        """A start after a Gauss-Newton step on its own variables; itself where none helps."""
+        h, _, left, f, damping = started
+        v = weights(left, colour)
+        A = (own * v[:, None]).reshape(h.n, -1)
+        G, g = A @ A.T, A @ (left * v[:, None]).ravel()
+        if not (np.all(np.isfinite(G)) and np.trace(G) > 0):
+            return started
+        for _ in range(4):
+            step = -np.linalg.solve(G + (damping * np.diag(np.diag(G)) + 1e-9 * np.trace(G) * np.eye(h.n)), g)
+            (trial,) = moved_by([h], step)
+            trial_r = misfit.residual(theta, [*present, trial], observer=observer, n_train=n_train)
+            trial_left, trial_f = projected(trial_r)
+            if trial_f < f:
+                return trial, trial_r, trial_left, trial_f, damping / 5
+            damping = max(damping, 1e-2) * 10
+        return started
 
-    def screened(started: _Start) -> Screened:
+    def score(started: _Start) -> float:
         h, f = started[0], started[3]
-        score = base - f - max(h.n, 1) * float(np.log(e.size))
-        return Screened(h, score if np.isfinite(score) else -np.inf)
+        found = base - f - max(h.n, 1) * float(np.log(e.size))
+        return found if np.isfinite(found) else -np.inf
 
-    first = list(POOL.map(lambda h: screened(advanced(start(h), 1)), proposed))
-    first.sort(key=lambda s: -s.score)
-    again = list(POOL.map(lambda s: screened(advanced(start(s.hypothesis), 3)), first[:STEPPED_ON]))
-    return sorted(again + first[STEPPED_ON:], key=lambda s: -s.score)
+    def looked_at(h: Hypothesis) -> tuple[_Start, Array]:
+        """A hypothesis after one step, and what it would have gained from noise."""
+        r = misfit.residual(theta, [*present, h], observer=observer, n_train=n_train)
+        started: _Start = (h, r, *projected(r), 1e-2)
+        if not (h.n and np.isfinite(started[3])):
+            return started, NO_CHANCE
+        own = own_slopes(h, r)
+        lucky = chance.tones if tone(h) is not None else chance.gains(own * w[:, None])
+        return stepped(started, own), lucky
+
+    def followed(started: _Start) -> _Start:
+        """A start after a few steps more."""
+        for _ in range(3 if started[0].n and np.isfinite(started[3]) else 0):
+            before = started[3]
+            started = stepped(started, own_slopes(started[0], started[1]))
+            if before - started[3] < 1:
+                break
+        return started
+
+    looks = list(POOL.map(looked_at, proposed))
+    lucky = np.max([each for _, each in looks], axis=0, initial=-np.inf)
+    first = sorted((started for started, _ in looks), key=lambda started: -score(started))
+    again = list(POOL.map(followed, first[:STEPPED_ON]))
+    rows = [Screened(started[0], score(started)) for started in again + first[STEPPED_ON:]]
+    return sorted(rows, key=lambda row: -row.score), lucky
 
 
 def search(
     calibration: Calibration, present: Fit, effects: Mapping[str, type[Effect]]
-) -> tuple[list[Candidate], list[Screened]]:
-    """Candidates for one more cause beside those present, best first, and the whole screening."""
+) -> tuple[list[Candidate], float]:
+    """Candidates for one more cause beside those present, best first, and the 2 log evidence that chance alone may reach."""
     misfit = calibration.misfit
     causes = present.causes
     if causes:
@@ -175,7 +190,7 @@ def search(
     proposed = [
         h for h in proposed if not mends(h.kind, h.location, found, survey) and not echoes(h, causes, survey)
     ]
-    rows = screen(misfit, theta, causes, observer, proposed)
+    rows, lucky = screen(misfit, theta, causes, observer, proposed)
     picked: list[Hypothesis] = []
     places: set[tuple[str, str, str]] = set()
     for row in rows:
@@ -200,7 +215,8 @@ def search(
         for cause, place, direction, found in large_changes(misfit, present, effects)
         if not mends(effects[cause], place, [(each.kind, each.location) for each in causes], survey)
     ]
-    return sorted(candidates, key=lambda c: -c.gain), rows
+    ranked = sorted(candidates, key=lambda c: -c.gain)
+    return ranked, quantile(lucky, misfit.parameters.n_factors)
 
 
 def _refitted(
@@ -261,7 +277,11 @@ def leading(fits: Sequence[Fit]) -> list[Fit]:
 def _confirmed(misfit: Misfit, candidate: Candidate, without: float) -> Candidate:
     """The candidate, a change of the model's own, fitted with its prior lifted: what a quadratic promises may not come true."""
     assert candidate.direction is not None
-    changed = replace(misfit, parameters=misfit.parameters.lifted(candidate.direction))
+    parameters = misfit.parameters.lifted(candidate.direction)
+    if candidate.beside is not None:
+        parameters = parameters.lifted(candidate.beside)
+        without = min(without, minus_two_log_evidence(candidate.fit, free=candidate.beside))
+    changed = replace(misfit, parameters=parameters)
     found = candidate.fit
     refit = fit(changed, found.theta, found.causes, observer=found.observer, iterations=10, tolerance=0.1)
     return replace(candidate, fit=refit, gain=without - minus_two_log_evidence(refit))
@@ -333,4 +353,28 @@ def wrong_parameters(
             if cause in effects and fresh and not mending and abs(v @ present.theta) > 0.5:
                 gain = without - minus_two_log_evidence(present, free=direction)
                 found.append(Candidate(cause, place, present, gain, direction))
-    return found
+    return _unmasked(found, without)
+
+
+def _unmasked(candidates: Sequence[Candidate], without: float) -> list[Candidate]:
+    """The candidates, the farthest ones with what they gain beside each other where that is more than each gains alone.
+
+    Two parameters far off widen the spread that all are held against, and so hide one another.
+    """
+    best = list(candidates)
+    single = [i for i, c in enumerate(best) if c.location != EVERYWHERE]
+    far = sorted(single, key=lambda i: -abs(_off(best[i])))[:SUSPECTS]
+    for i, j in itertools.permutations(far, 2):
+        one, other = candidates[i], candidates[j]
+        both = without - minus_two_log_evidence(one.fit, free=np.array([one.direction, other.direction]))
+        # What a useless companion costs is no merit.
+        gain = both - max(other.gain, 0.0)
+        if gain > best[i].gain:
+            best[i] = replace(one, gain=gain, beside=other.direction)
+    return best
+
+
+def _off(candidate: Candidate) -> float:
+    """How far a parameter is from its nominal value, in widths."""
+    assert candidate.direction is not None
+    return float(candidate.fit.theta @ candidate.direction)

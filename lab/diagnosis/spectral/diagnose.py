@@ -12,7 +12,7 @@ import numpy as np
 from identification.recording import Recording
 from identification.response import FrequencyResponse
 from lab.diagnosis.calibrate import Calibration, parameters_of
-from lab.diagnosis.diagnose import State, calibrated_rig, calibration_of, effects_of, evidence_threshold
+from lab.diagnosis.diagnose import State, calibrated_rig, calibration_of, effects_of
 from lab.diagnosis.misfit import Parameters
 from lab.diagnosis.outcome import (
     CONSISTENT,
@@ -128,6 +128,15 @@ def diagnose_spectra(
             break
         first, stage = first or ranked, step
     return _outcome(stage, origin, given, nominal, rig, first, refused)
+
+
+def evidence_threshold(looks: int) -> float:
+    """2 log evidence that a cause must gain to be named when so many were looked at.
+
+    Each cause pays log n per variable already (Schwarz 1978); the largest of many chance gains is covered by their number
+    (Bonferroni), and a factor e⁵, decisive on Jeffreys' scale, is asked beyond.
+    """
+    return 2 * float(np.log(max(looks, 1))) + 10
 
 
 def _experiment(
