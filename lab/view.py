@@ -13,17 +13,21 @@ from lab.errors import FileError, LabError
 def view(folder: str | Path) -> None:
     """Open `run.rrd` of an output folder in the Rerun viewer, and return when that is closed.
 
+    Args:
+        folder: written by the lab, or the .rrd file itself.
+
     Raises:
         FileError: there is no `run.rrd`.
         LabError: there is no display, or the viewer does not start.
     """
-    path = Path(folder) / "run.rrd"
+    path = Path(folder)
+    path = path if path.suffix == ".rrd" else path / "run.rrd"
     if not path.is_file():
-        raise FileError(f"{path}: no such file; expected a folder that `lab run` or `lab identify` wrote")
+        raise FileError(f"{path}: no such file; expected a folder that `lab run`, `lab identify` or `lab diagnose` wrote")
     if not _has_display():
         raise LabError(
             f"there is no display here to show {path}; copy it to a machine that has one and run "
-            "'rerun run.rrd' there, or open report.html in a browser"
+            f"'rerun {path.name}' there, or open report.html in a browser"
         )
     done = subprocess.run([sys.executable, "-m", "rerun", str(path)], check=False)
     if done.returncode:

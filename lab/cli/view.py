@@ -16,7 +16,7 @@ from lab.cli.shared import FILE, example
 )
 @click.argument("folder", metavar="DIR", type=FILE)
 def command(folder: Path) -> None:
-    """Open the run.rrd of an output folder in the Rerun viewer.
+    """Open the run.rrd of an output folder, or an .rrd file, in the Rerun viewer.
 
     Where there is no display, it says what to do instead.
     """
