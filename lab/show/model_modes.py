@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import replace
 
 import numpy as np
@@ -12,7 +13,6 @@ from lab.compare import compare
 from lab.diagnosis.outcome import Diagnosis
 from lab.errors import LabError
 from lab.show.findings import Table
-from lab.show.verdict import lowered
 from lab.validation import Limits
 
 BAND = 0.5
@@ -63,7 +63,7 @@ def mode_changes(diagnosis: Diagnosis) -> Table:
                 change,
                 f"{100 * z:.3g}",
                 own[1],
-                lowered(pair.mac),
+                f"{math.floor(1e4 * pair.mac + 1e-8) / 1e4:.4f}",  # never rounded up
                 "within" if kept else "BEYOND",
             )
         )

@@ -107,7 +107,7 @@ def test_the_modes_of_both_models_stand_side_by_side(diagnosis):
     assert [row[2] for row in rows] == [f"{f:.5g}" for f in extended]
     assert [row[-1] for row in rows] == ["BEYOND", "within"]
     same = mode_changes(replace(diagnosis, extended=diagnosis.nominal)).rows
-    assert [row[3:] for row in same] == [("+0 %", row[4], row[4], "1", "within") for row in same]
+    assert [row[3:] for row in same] == [("+0 %", row[4], row[4], "1.0000", "within") for row in same]
 
 
 def test_a_new_mode_is_said_to_be_new(diagnosis):

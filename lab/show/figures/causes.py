@@ -37,7 +37,14 @@ def causes_figure(diagnosis: Diagnosis) -> Drawing | None:
                 hatch="" if each.found else "///",
                 edgecolor="0.4",
             )
-            axes.annotate(f"  {evidence(each.log_evidence_gain)}", (length[row], row), va="center", ha="left")
+            axes.annotate(
+                evidence(each.log_evidence_gain),
+                (length[row], row),
+                xytext=(3, 0),
+                textcoords="offset points",
+                va="center",
+                ha="left",
+            )
         axes.set_xscale("log")
         axes.set_xlim(0.5, 4 * float(length.max()))
         axes.axvline(DECISIVE, color="black", linestyle=":", linewidth=0.8)
