@@ -23,7 +23,9 @@ def view(folder: str | Path) -> None:
     path = Path(folder)
     path = path if path.suffix == ".rrd" else path / "run.rrd"
     if not path.is_file():
-        raise FileError(f"{path}: no such file; expected a folder that `lab run`, `lab identify` or `lab diagnose` wrote")
+        raise FileError(
+            f"{path}: no such file; expected a folder that `lab run`, `lab identify` or `lab diagnose` wrote"
+        )
     if not _has_display():
         raise LabError(
             f"there is no display here to show {path}; copy it to a machine that has one and run "
