@@ -12,7 +12,7 @@ TEXT = (ROOT / "docs/theory.md").read_text("utf-8")
 def test_the_equations_hold(monkeypatch):
     monkeypatch.chdir(ROOT)
     programs = blocks(TEXT, "python")
-    assert len(programs) == 4
+    assert len(programs) == 5
     names = {}
     for program in programs:
         exec(program, names)
