@@ -21,6 +21,20 @@ from tests.lab.showcase import chain_result, chain_rig, pulse_recording, random_
 
 EVIL = '<script>alert(1)</script> & "$x$" \x00'
 VOID = {"meta", "br", "link", "img", "hr", "input"}
+BLOCKS = {"p", "div", "table", "ul", "ol", "dl", "pre", "figure", "h1", "h2", "h3", "header", "main"}
+PARENTS = {
+    "li": {"ul", "ol"},
+    "dt": {"dl"},
+    "dd": {"dl"},
+    "caption": {"table"},
+    "thead": {"table"},
+    "tbody": {"table"},
+    "tr": {"thead", "tbody"},
+    "th": {"tr"},
+    "td": {"tr"},
+    "figcaption": {"figure"},
+}
+"""Where HTML allows these elements."""
 
 
 class Page(HTMLParser):
@@ -34,6 +48,9 @@ class Page(HTMLParser):
 
     def handle_starttag(self, tag, attrs):
         self.tags[tag] += 1
+        assert tag not in BLOCKS or "p" not in self.open, f"{tag} inside a paragraph"
+        assert tag not in PARENTS or self.open[-1] in PARENTS[tag], f"{tag} inside {self.open[-1]}"
+        assert len({key for key, _ in attrs}) == len(attrs), f"{tag} has an attribute twice"
         for key, value in attrs:
             if key == "id":
                 self.ids[value] += 1
