@@ -137,3 +137,12 @@ def test_without_a_model_or_a_pair_there_is_nothing_to_judge():
     assert validate(replace(result, comparison=replace(result.comparison, pairs=()))) == ()
     missing = replace(result, comparison=replace(result.comparison, pairs=result.comparison.pairs[1:]))
     assert outcomes(missing)[LOWEST].outcome == "undecided"
+
+
+def test_a_structure_without_damping_has_no_relative_damping_error():
+    result = made([1.01] * 3, 0.01)
+    none = replace(result.truth_modes, damping_ratio=np.zeros(3))
+    still = replace(result, truth_modes=none, comparison=compare(none, result.modes))
+    found = outcomes(still)
+    assert (found[DAMPING].outcome, found[DAMPING].value) == ("undecided", None)
+    assert found[FREQUENCY].outcome == "pass"
