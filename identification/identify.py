@@ -12,18 +12,17 @@ from identification.clusters import Poles, Thresholds, difference
 from identification.errors import IdentificationError, RecordingError
 from identification.explanation import explanation
 from identification.found import Found, matrices_of
+from identification.found_bars import error_bars
 from identification.methods import find_method
 from identification.modes import Modes
-from identification.observer_redraw import observer_scatter
 from identification.output_only import horizon_warning
 from identification.recording import Recording
 from identification.refinement import Refinement, refinement
 from identification.response_methods import RESPONSE_METHODS
 from identification.settled import NESTED, brief_warnings, settle
-from identification.spectral_scatter import SPECTRAL, spectral_std
 from identification.stability import Stabilization, stabilize
 from identification.systems import Realization, SecondOrder
-from identification.uncertainty import Placed, matrices_with_error_bars, modes_with_error_bars
+from identification.uncertainty import Placed
 
 HANKEL = (*NESTED, *(name for name in RESPONSE_METHODS if name != "era_dc"))
 """Methods whose horizon is the block rows and columns of one Hankel matrix."""
@@ -118,7 +117,7 @@ def identify(
         modes, matrices = refined.modes, refined.second_order
         stable = tuple(stable[k] for k in refined.partners)
     elif uncertainty:
-        modes, matrices, missing = _error_bars(found, matrices)
+        modes, matrices, missing = error_bars(found, matrices)
         after += missing
     warnings = (
         *_order_warnings(realization, modes),
@@ -219,44 +218,6 @@ def _refined(
     except IdentificationError as error:
         return None, (), (f"Nothing was refined: {error}.",)
     return refined, (refined.sentence,), refined.warnings
-
-
-def _error_bars(
-    found: Found, matrices: SecondOrder | None
-) -> tuple[Modes, SecondOrder | None, tuple[str, ...]]:
-    """Modes and matrices with their standard deviations, or the reasons why they have none."""
-    modes, notes = found.modes, []
-    wanting = matrices if matrices is not None and matrices.mass_std is None else None
-    if found.realization.method == "okid_era" and len(modes):  # one redraw of the noise serves both
-        try:
-            scatter = observer_scatter(found.recording, found.realization, modes, matrices=wanting)
-        except IdentificationError as error:
-            return modes, matrices, (f"Modes and matrices have no error bars: {error}.",)
-        modes = replace(modes, frequency_std=scatter.frequency, damping_std=scatter.damping)
-        return modes, scatter.matrices or matrices, ()
-    try:
-        modes = _bars_of_modes(found)
-    except IdentificationError as error:
-        notes.append(f"The modes have no error bars: {error}.")
-    if wanting is not None:
-        try:
-            matrices = matrices_with_error_bars(found.recording, found.realization, wanting)
-        except IdentificationError as error:
-            notes.append(f"Mass, damping and stiffness have no error bars: {error}.")
-    return modes, matrices, tuple(notes)
-
-
-def _bars_of_modes(found: Found) -> Modes:
-    """Modes with error bars."""
-    given = found.settings
-    if found.realization.method not in SPECTRAL:
-        return modes_with_error_bars(
-            found.recording, found.realization, found.modes, places=found.places, settings=given
-        )
-    if not len(found.modes):
-        return found.modes
-    frequency, damping = spectral_std(found.recording, found.realization, found.tracks(), settings=given)
-    return replace(found.modes, frequency_std=frequency, damping_std=damping)
 
 
 def _order_warnings(realization: Realization, modes: Modes) -> tuple[str, ...]:

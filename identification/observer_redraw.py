@@ -19,25 +19,23 @@ from identification.modes import Modes
 from identification.observer import observe
 from identification.okid import okid_era, realize
 from identification.recording import Array, Recording
-from identification.residual_scatter import residual_std
+from identification.residual_scatter import residual_scatter
 from identification.second_order import second_order
-from identification.spectral_scatter import values_near
+from identification.spectral_scatter import Bars, values_near
 from identification.systems import Realization, SecondOrder, StateSpace
 
 MATRICES = ("mass", "damping", "stiffness")
 
 
 class Scatter(NamedTuple):
-    """Standard deviations.
+    """Error bars of modes and matrices.
 
     Attributes:
-        frequency: of each mode [Hz], shape (n_modes,).
-        damping: of each damping ratio, likewise.
+        modes: of the modes.
         matrices: with their standard deviations; None where none were given.
     """
 
-    frequency: Array
-    damping: Array
+    modes: Bars
     matrices: SecondOrder | None
 
 
@@ -65,12 +63,13 @@ def observer_scatter(
         TooShortError: no more samples than unknowns.
         IdentificationError: there is no mode, or no model of forced motion near the modes.
 
-    Source: as for `residual_std`, with the likeliest model near the modes (`forced_model`) as the truth.
+    Source: as for `residual_scatter`, with the likeliest model near the modes (`forced_model`) as the truth.
     """
     n = len(modes)
     length = int(realization.settings["observer"])
     if observe(recording, observer=length).exact:
-        return Scatter(np.zeros(n), np.zeros(n), None if matrices is None else _with_std(matrices, 0.0))
+        none = Bars(np.zeros(n), np.zeros(n), np.zeros(n))
+        return Scatter(none, None if matrices is None else _with_std(matrices, 0.0))
     model = forced_model(recording, modes, likeliest=True)
     own = [realization.order] * n if orders is None else list(orders)
 
@@ -88,9 +87,11 @@ def observer_scatter(
     truth = np.concatenate(
         [values_near(modes.poles, model.system.modes()), *_entries(model.system, matrices)]
     )
-    std = residual_std(recording, model.residuals, estimate, n_unknowns=model.n_unknowns, truth=truth)
+    std, shift = residual_scatter(
+        recording, model.residuals, estimate, n_unknowns=model.n_unknowns, truth=truth
+    )
     found = None if matrices is None else _with_std(matrices, std[2 * n :])
-    return Scatter(std[:n], std[n : 2 * n], found)
+    return Scatter(Bars(std[:n], std[n : 2 * n], shift[n : 2 * n]), found)
 
 
 def matrix_model(realization: Realization, n_dofs: int) -> StateSpace:

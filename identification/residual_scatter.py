@@ -12,6 +12,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import replace
+from typing import NamedTuple
 
 import numpy as np
 import scipy.fft
@@ -29,7 +30,20 @@ MAY_FAIL = 0.1
 """Share of the tests drawn that may fail to give an estimate."""
 
 
-def residual_std(
+class Redrawn(NamedTuple):
+    """What redrawn noise does to an estimate.
+
+    Attributes:
+        std: one standard deviation, from the truth where that is known, shape (n_values,); infinite where more than a
+            share `MAY_FAIL` of the tests do not give the estimate.
+        shift: what noise adds to it on average, shape (n_values,); NaN where the truth is not known.
+    """
+
+    std: Array
+    shift: Array
+
+
+def residual_scatter(
     recording: Recording,
     residuals: Sequence[Array],
     estimate: Callable[[Recording], Array],
@@ -37,8 +51,8 @@ def residual_std(
     n_unknowns: int = 0,
     truth: Array | None = None,
     rng: np.random.Generator | None = None,
-) -> Array:
-    """One standard deviation of an estimate, from tests with the noise of the outputs drawn anew.
+) -> Redrawn:
+    """One standard deviation of an estimate and its mean error, from tests with the noise of the outputs drawn anew.
 
     Where the truth of these tests is told, deviations count from it: what noise makes too large on average is part of
     the error.
@@ -52,7 +66,7 @@ def residual_std(
         rng: source of the phases; the same ones for every call when None, so that a result can be repeated.
 
     Returns:
-        Shape (n_values,); infinite where more than a share `MAY_FAIL` of the tests do not give the estimate.
+        Both.
 
     Raises:
         TooShortError: no more samples than unknowns.
@@ -77,29 +91,29 @@ def residual_std(
             for record, e in zip(recording.records, residuals, strict=True)
         )
         draws.append(estimate(replace(recording, records=records)))
-    return deviation(np.array(draws), truth)
+    return scatter_of(np.array(draws), truth)
 
 
-def deviation(values: Array, truth: Array | None = None) -> Array:
-    """One standard deviation of estimates from tests that were drawn, from their truth, or from their mean.
+def scatter_of(values: Array, truth: Array | None = None) -> Redrawn:
+    """One standard deviation of estimates from tests that were drawn, about their truth or else their mean, and their shift.
 
     Args:
         values: shape (n_draws, n_values); NaN where an estimate could not be had.
         truth: shape (n_values,); NaN where it is not known.
 
     Returns:
-        Shape (n_values,); infinite where more than a share `MAY_FAIL` of the tests do not give the estimate.
+        Both.
 
-    Source: Efron and Tibshirani (1993), An Introduction to the Bootstrap, eq. (6.6); from the truth, eq. (10.1) added.
+    Source: Efron and Tibshirani (1993), An Introduction to the Bootstrap, eq. (6.6), and (10.1) for the shift.
     """
     have = np.isfinite(values)
     n = np.maximum(np.sum(have, axis=0), 2)
-    centre = np.sum(values, axis=0, where=have) / n
-    if truth is not None:
-        known = np.isfinite(truth)
-        centre, n = np.where(known, truth, centre), n + known
-    variance = np.sum((values - centre) ** 2, axis=0, where=have) / (n - 1)
-    return np.where(np.mean(have, axis=0) >= 1 - MAY_FAIL, np.sqrt(variance), np.inf)
+    mean = np.sum(values, axis=0, where=have) / n
+    truth = np.full(mean.shape, np.nan) if truth is None else truth
+    known = np.isfinite(truth)
+    variance = np.sum((values - np.where(known, truth, mean)) ** 2, axis=0, where=have) / (n - 1 + known)
+    enough = np.mean(have, axis=0) >= 1 - MAY_FAIL
+    return Redrawn(np.where(enough, np.sqrt(variance), np.inf), np.where(enough, mean - truth, np.nan))
 
 
 def redrawn(e: Array, rng: np.random.Generator) -> Array:

@@ -12,16 +12,16 @@ from identification.errors import IdentificationError
 from identification.pulse import markov_parameters
 from identification.pulse_scatter import residual_std
 from identification.recording import Array, Recording
-from identification.residual_scatter import DRAWS, deviation
+from identification.residual_scatter import DRAWS, scatter_of
 from identification.response_methods import RESPONSE_METHODS
-from identification.spectral_scatter import values_near
+from identification.spectral_scatter import Bars, values_near
 from identification.systems import Realization
 
 
 def response_scatter(
     recording: Recording, realization: Realization, places: Sequence[tuple[int, complex]]
-) -> Array:
-    """Standard deviations of frequencies [Hz], then damping ratios, with what noise shifts on average in them.
+) -> Bars:
+    """Standard deviations of frequencies and damping ratios, with what noise shifts on average in them.
 
     The noise is taken as white, with a variance of its own in each response: that of the residual of the model.
 
@@ -31,7 +31,7 @@ def response_scatter(
         places: order and continuous-time pole [rad/s] of each mode.
 
     Returns:
-        Shape (2, n_modes); infinite where a tenth of the tests drawn lose a mode.
+        All three; infinite where a tenth of the tests drawn lose a mode.
 
     Raises:
         TooShortError: fewer samples than parameters.
@@ -63,4 +63,6 @@ def response_scatter(
 
     rng = np.random.default_rng(0)
     draws = [estimate(clean + std * rng.standard_normal(clean.shape)) for _ in range(DRAWS)]
-    return deviation(np.array(draws), values_near(poles, system.modes())).reshape(2, -1)
+    spread, shift = scatter_of(np.array(draws), values_near(poles, system.modes()))
+    n = poles.size
+    return Bars(spread[:n], spread[n:], shift[n:])

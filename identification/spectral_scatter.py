@@ -12,7 +12,7 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from itertools import pairwise
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -25,7 +25,7 @@ from identification.methods import find_method
 from identification.modes import Complex, Modes
 from identification.recording import Array, Recording
 from identification.resampling import jackknife_std, spread_of_parts
-from identification.residual_scatter import residual_std
+from identification.residual_scatter import residual_scatter
 from identification.spectra import cross_spectra
 from identification.stability import Stabilization
 from identification.systems import Realization
@@ -41,6 +41,21 @@ MAX_ORDERS = 8
 
 LOST = 0.2
 """Relative distance beyond which the nearest pole is another one."""
+
+
+class Bars(NamedTuple):
+    """Error bars of modes.
+
+    Attributes:
+        frequency: one standard deviation [Hz], shape (n_modes,); infinite where a mode is lost.
+        damping: of the damping ratio, likewise.
+        damping_shift: what noise adds to the damping ratio on average, and `damping` counts, shape (n_modes,); NaN where
+            it is not known.
+    """
+
+    frequency: Array
+    damping: Array
+    damping_shift: Array
 
 
 @dataclass(frozen=True, eq=False)
@@ -109,8 +124,8 @@ def spectral_std(
     tracks: Tracks,
     *,
     settings: Mapping[str, Any] | None = None,
-) -> tuple[Array, Array]:
-    """Standard deviations of frequencies [Hz] and damping ratios.
+) -> Bars:
+    """Standard deviations of frequencies and damping ratios, and the shift of the latter.
 
     Args:
         recording: the one that was realized.
@@ -119,17 +134,17 @@ def spectral_std(
         settings: further settings that the method was given.
 
     Returns:
-        Shapes (n_modes,) each; infinite where a mode is lost.
+        All three.
 
     Raises:
         TooShortError: too few data to tell.
         IdentificationError: records whose parts do not tell the same, without measured forces.
 
-    Source: as for `residual_std` and `jackknife_std`.
+    Source: as for `residual_scatter` and `jackknife_std`.
     """
     if realization.method == "efdd":
         std = _leaving_pieces_out(recording, realization, tracks)
-        return std[0], std[1]
+        return Bars(std[0], std[1], np.full(std.shape[1], np.nan))
     again = repeat(recording, realization, np.unique(tracks.orders).tolist(), settings or {})
     n = len(np.unique(tracks.mode))
 
@@ -150,10 +165,13 @@ def spectral_std(
             )
         model = forced_model(recording, modes, likeliest=True)
         truth = values_near(modes.poles, model.system.modes())
-        std = residual_std(recording, model.residuals, estimate, n_unknowns=model.n_unknowns, truth=truth)
+        std, shift = residual_scatter(
+            recording, model.residuals, estimate, n_unknowns=model.n_unknowns, truth=truth
+        )
     else:
         std = jackknife_std(recording, estimate)
-    return std[:n], std[n:]
+        shift = np.full(2 * n, np.nan)
+    return Bars(std[:n], std[n:], shift[n:])
 
 
 def values_near(poles: Complex, modes: Modes) -> Array:

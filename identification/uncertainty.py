@@ -78,12 +78,13 @@ def modes_with_error_bars(
     elif realization.method == "era":
         std = _from_tangents(recording, realization, places)
     elif realization.method == "okid_era":
-        scatter = observer_scatter(recording, realization, modes, orders=[place.order for place in places])
-        std = scatter.frequency, scatter.damping
+        std = observer_scatter(recording, realization, modes, orders=[place.order for place in places]).modes[
+            :2
+        ]
     elif realization.method in SPECTRAL:
-        std = spectral_std(recording, realization, Tracks.of_places(places), settings=given)
+        std = spectral_std(recording, realization, Tracks.of_places(places), settings=given)[:2]
     else:
-        std = tuple(response_scatter(recording, realization, places))
+        std = response_scatter(recording, realization, places)[:2]
     return replace(modes, frequency_std=std[0], damping_std=std[1])
 
 

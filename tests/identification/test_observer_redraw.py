@@ -42,7 +42,7 @@ def test_error_bars_hold_where_the_observer_is_hardly_determined(test):
         found = okid_era(recording, 6)
         modes = found.system.modes()
         modes = modes.take([int(np.argmin(np.abs(modes.poles - pole))) for pole in TRUTH.poles])
-        scatter = observer_scatter(recording, found, modes)
+        scatter = observer_scatter(recording, found, modes).modes
         error = np.stack([modes.frequency_hz - TRUTH.frequency_hz, modes.damping_ratio - TRUTH.damping_ratio])
         std = np.stack([scatter.frequency, scatter.damping])
         inside.append(np.abs(error) < 2 * std)
@@ -67,7 +67,7 @@ def test_modes_and_matrices_share_the_tests_drawn():
     matrices = identify(recording, "okid_era", order=6, dofs=dofs, uncertainty=False).second_order
     both, alone = (observer_scatter(recording, found, modes, matrices=each) for each in (matrices, None))
     # The fit of B and D leaves the poles alone, so that the same draws move them the same way.
-    np.testing.assert_array_equal(both.frequency, alone.frequency)
+    np.testing.assert_array_equal(both.modes.frequency, alone.modes.frequency)
     assert alone.matrices is None
     assert np.all(both.matrices.mass_std > 0)
 

@@ -7,7 +7,7 @@ import pytest
 
 from identification.errors import TooShortError
 from identification.recording import Record
-from identification.residual_scatter import DRAWS, NEARBY, redrawn, residual_std
+from identification.residual_scatter import DRAWS, NEARBY, redrawn, residual_scatter
 from tests.systems import paper_chain3, recorded
 
 
@@ -19,7 +19,7 @@ def test_a_linear_estimate_scatters_as_its_weights_say():
         recording, records=(replace(recording.records[0], outputs=recording.records[0].outputs + noise),)
     )
     weights = rng.standard_normal((30, 2, 400))
-    std = residual_std(noisy, [noise], lambda r: np.tensordot(weights, r.records[0].outputs, 2))
+    std = residual_scatter(noisy, [noise], lambda r: np.tensordot(weights, r.records[0].outputs, 2)).std
     expected = 0.1 * np.linalg.norm(weights.reshape(30, -1), axis=1)
     # Each is good to 1/√(2 · 23); thirty together are five times better.
     assert np.sqrt(np.mean((std / expected) ** 2)) == pytest.approx(1, abs=4 / np.sqrt(2 * (DRAWS - 1) * 30))
@@ -54,7 +54,7 @@ def test_coloured_noise_keeps_its_colour_and_its_share_at_each_output():
         y = part.records[0].outputs
         return np.array([np.mean(y[0]), y[0, 500] - y[1, 500]])
 
-    std = residual_std(recording, [noise], estimate)
+    std = residual_scatter(recording, [noise], estimate).std
     # The mean of n values scatters by √(S(0) / n) with S(0) = 20, as their spectrum is sinc² with its first zero at the
     # line n / 20, of which the lines nearby reach half: its mean there is 0.77. The power of some 25 lines is known
     # to 20 %, so the deviation to 10 %, and to 15 % for the draws: three of both. White noise has 1 / √20 = 0.22.
@@ -70,7 +70,7 @@ def test_noise_that_the_fit_has_absorbed_at_a_resonance_is_drawn_all_the_same():
     record = Record("random", np.zeros((2, 1000)), noise)
     recording = replace(recorded(paper_chain3(), [np.zeros((2, 4))]), records=(record,))
     wave = np.cos(2 * np.pi * 100 * np.arange(1000) / 1000)
-    std = residual_std(recording, [noise], lambda r: r.records[0].outputs @ wave)
+    std = residual_scatter(recording, [noise], lambda r: r.records[0].outputs @ wave).std
     # Of 51 lines nearby 46 are left. Fifty of them tell the deviation to 7 %, the draws to 15 %: three of both.
     np.testing.assert_allclose(std, np.linalg.norm(wave) * np.sqrt(46 / 51), rtol=0.5)
 
@@ -84,8 +84,8 @@ def test_what_often_fails_has_no_finite_error_bar_and_short_records_none():
     def fails(part):
         return np.array([np.nan if part.records[0].outputs[0, 3] > 1 else 1.0, 2.0])
 
-    std = residual_std(recording, [noise], fails)
+    std = residual_scatter(recording, [noise], fails).std
     assert std[0] == np.inf
     assert std[1] == 0
     with pytest.raises(TooShortError, match="beyond 100 unknowns"):
-        residual_std(recording, [noise], fails, n_unknowns=100)
+        residual_scatter(recording, [noise], fails, n_unknowns=100)
