@@ -6,6 +6,8 @@ from lab.diagnosis.outcome import CONSISTENT, EXPLAINED, Diagnosis
 from lab.show.findings import place, share, words
 from lab.show.verdict import FAILED, FOUND, PASSED, Verdict
 
+NOTABLE = 1.5
+"""Errors of a consistent model, in noise floors, that a reader will ask about."""
 GLOSSARY = (
     ("as given", "the model file, unchanged"),
     (
@@ -44,7 +46,9 @@ def headline(diagnosis: Diagnosis) -> Verdict:
     noise = f"noise alone makes {share(e.noise_floor)}"
     if diagnosis.verdict == CONSISTENT:
         error = f"it misses {share(e.calibrated)} of the signal on data kept aside"
-        return Verdict(PASSED, f"Consistent: the model describes this test; {error}, and {noise}.")
+        more = e.calibrated > NOTABLE * e.noise_floor and diagnosis.warnings
+        why = "; why the difference is no finding is said under warnings" if more else ""
+        return Verdict(PASSED, f"Consistent: the model describes this test; {error}, and {noise}{why}.")
     if diagnosis.verdict == EXPLAINED:
         n = len(diagnosis.findings)
         count = "one thing is" if n == 1 else f"{n} things are"

@@ -78,6 +78,9 @@ def test_the_headline_is_one_sentence_that_needs_no_other(diagnosis):
         "passed",
         "Consistent: the model describes this test",
     )
+    assert clean.sentence.endswith(
+        "why the difference is no finding is said under warnings."
+    )  # 8 % against 1 %
     left = headline(replace(diagnosis, verdict="unexplained"))
     assert left.outcome == "failed"
     assert (

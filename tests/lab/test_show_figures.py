@@ -4,9 +4,11 @@ from dataclasses import replace
 
 import numpy as np
 
+from lab.diagnosis.restoring import restoring_force
 from lab.show.figures.causes import calibration_figure, causes_figure
 from lab.show.figures.error_bars import error_bars
 from lab.show.figures.responses import coherences, nyquist
+from lab.show.figures.restoring import restoring_figure
 from lab.show.signals import spectra
 from tests.lab.diagnosed import explained, recorded, two_masses
 from tests.lab.showcase import chain_result, chain_rig, pulse_recording, random_recording
@@ -56,3 +58,10 @@ def test_causes_and_calibration_are_drawn_where_there_are_any():
     nothing = replace(diagnosis, findings=(), alternatives=(), calibration={})
     assert causes_figure(nothing) is None
     assert calibration_figure(nothing) is None
+
+
+def test_a_cloud_of_forces_may_be_shifted_where_nothing_senses_constant_ones():
+    recording = recorded(two_masses())
+    restoring = restoring_force(explained(two_masses(), recording), recording)
+    assert "shifted as a whole" in restoring_figure(restoring, static=False).caption
+    assert "shifted as a whole" not in restoring_figure(restoring).caption
