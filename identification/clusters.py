@@ -104,23 +104,23 @@ def difference(a: Poles, b: Poles, limits: Thresholds) -> Difference:
     """How far the poles `a` are from the poles `b`.
 
     Args:
-        a: poles of one order.
-        b: poles of another one.
+        a: poles of one order, or a stack of them along further axes in front.
+        b: poles of another one, likewise.
         limits: what is allowed.
 
     Returns:
-        Differences in parts of what is allowed, and the distance, shape (n_a, n_b) each.
+        Differences in parts of what is allowed, and the distance, shape (…, n_a, n_b) each.
 
     Source: the distance is that of Reynders, Houbrechts and De Roeck (2012), Mech. Syst. Signal Process. 29,
         |λ_a - λ_b| / |λ| + 1 - MAC, with each part divided by what is allowed.
     """
-    f = a.frequency_hz[:, None]
-    z = a.damping_ratio[:, None]
+    f, z = a.frequency_hz[..., :, None], a.damping_ratio[..., :, None]
+    f_b, z_b = b.frequency_hz[..., None, :], b.damping_ratio[..., None, :]
     allowed = np.maximum(limits.frequency_tolerance, limits.damping_tolerance * z)
-    frequency = np.abs(f - b.frequency_hz) / (allowed * f)
-    step = np.abs(z - b.damping_ratio)
+    frequency = np.abs(f - f_b) / (allowed * f)
+    step = np.abs(z - z_b)
     damping = step / np.maximum(limits.damping_tolerance * z, limits.damping_step)
-    shape = (1 - np.abs(a.shapes.conj().T @ b.shapes) ** 2) / (1 - limits.min_mac)
+    shape = (1 - np.abs(a.shapes.conj().mT @ b.shapes) ** 2) / (1 - limits.min_mac)
     plane = np.hypot(frequency, step / allowed)
     return Difference(frequency, shape, damping, plane + shape)
 

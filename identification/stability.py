@@ -189,14 +189,35 @@ def _nearest_below(poles: Poles, limits: Thresholds) -> tuple[Indices, Array, ND
     """
     mate, far = np.full(poles.order.size, -1), np.zeros((3, poles.order.size))
     double = np.zeros(poles.order.size, dtype=bool)
-    borders = np.flatnonzero(np.diff(poles.order, prepend=-1, append=-1)).tolist()
-    for a, b, c in zip(borders, borders[1:], borders[2:], strict=False):
-        apart = difference(poles.take(slice(b, c)), poles.take(slice(a, b)), limits)
-        nearest, own = np.argmin(apart.distance, axis=1), np.arange(c - b)
-        mate[b:c] = a + nearest
-        far[:, b:c] = [each[own, nearest] for each in apart[:3]]
-        double[b:c] = np.argmin(apart.distance, axis=0)[nearest] != own
+    borders = np.flatnonzero(np.diff(poles.order, prepend=-1))
+    if borders.size < 2:
+        return mate, far, double
+    stack, row, column = _by_order(poles, borders)
+    below, above = (
+        Poles(stack.order[k], stack.frequency_hz[k], stack.damping_ratio[k], stack.shapes[k])
+        for k in (slice(-1), slice(1, None))
+    )
+    apart = difference(above, below, limits)
+    distance = np.where(np.isnan(apart.distance), np.inf, apart.distance)  # (n_orders - 1, width, width)
+    own = slice(borders[1], None)
+    upper, place = row[own] - 1, column[own]
+    nearest = np.argmin(distance, axis=2)[upper, place]
+    mate[own] = borders[upper] + nearest
+    far[:, own] = [each[upper, place, nearest] for each in apart[:3]]
+    double[own] = np.argmin(distance, axis=1)[upper, nearest] != place
     return mate, far, double
+
+
+def _by_order(poles: Poles, borders: Indices) -> tuple[Poles, Indices, Indices]:
+    """A row of poles for each order, filled up with NaN, and the row and column of each pole."""
+    size = np.diff(borders, append=poles.order.size)
+    row = np.repeat(np.arange(size.size), size)
+    column = np.arange(poles.order.size) - borders[row]
+    frequency, damping = np.full((2, size.size, np.max(size)), np.nan)
+    frequency[row, column], damping[row, column] = poles.frequency_hz, poles.damping_ratio
+    shapes = np.zeros((size.size, len(poles.shapes), np.max(size)), complex)
+    shapes[row, :, column] = poles.shapes.T
+    return Poles(poles.order[borders], frequency, damping, shapes), row, column
 
 
 def _first(rules: dict[str, NDArray[np.bool_]]) -> Indices:

@@ -5,11 +5,11 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from identification.clusters import keep_long
+from identification.clusters import Poles, Thresholds, difference, keep_long
 from identification.errors import IdentificationError
 from identification.recording import Channel
 from identification.ssi import ssi_cov
-from identification.stability import RULES, STABLE, stabilize
+from identification.stability import RULES, STABLE, _nearest_below, stabilize
 from identification.systems import Realization, StateSpace
 from tests.ambient import ambient
 from tests.systems import chain7
@@ -204,3 +204,31 @@ def test_arrays_cannot_be_changed_and_the_repr_counts():
 def test_wrong_thresholds_are_told(thresholds, says):
     with pytest.raises(IdentificationError, match=says):
         stabilize(realized([(5.0, 0.02, SHAPE)]), **thresholds)
+
+
+@pytest.mark.parametrize("sizes", [(3,), (1, 4), (2, 5, 3, 1, 6)])
+def test_the_nearest_pole_of_the_next_lower_order_is_that_of_a_plain_loop(sizes):
+    rng = np.random.default_rng(sum(sizes))
+    n, limits = sum(sizes), Thresholds()
+    shapes = rng.standard_normal((3, n)) + 1j * rng.standard_normal((3, n))
+    order = np.repeat(2 * np.arange(1, len(sizes) + 1), sizes)
+    poles = Poles.normalized(order, rng.uniform(1, 2, n), rng.uniform(0, 0.1, n), shapes)
+    mate, far, double = _nearest_below(poles, limits)
+    for k in range(n):
+        own, lower = np.flatnonzero(order == order[k]), np.flatnonzero(order == order[k] - 2)
+        if not lower.size:
+            assert (mate[k], double[k]) == (-1, False)
+            continue
+        pairs = [
+            [difference(poles.take(slice(i, i + 1)), poles.take(slice(j, j + 1)), limits) for j in lower]
+            for i in own
+        ]
+        distance = np.array([[pair.distance[0, 0] for pair in row] for row in pairs])
+        i = int(np.flatnonzero(own == k)[0])
+        j = int(np.argmin(distance[i]))
+        assert mate[k] == lower[j]
+        # Rounding of sums of three products.
+        np.testing.assert_allclose(
+            far[:, k], [each[0, 0] for each in pairs[i][j][:3]], rtol=1e-12, atol=1e-14
+        )
+        assert double[k] == (np.argmin(distance[:, j]) != i)
