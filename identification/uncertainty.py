@@ -7,8 +7,9 @@
 - `era_dc`, `itd`, `mrtd`, `mmrtd`: the noise redrawn, and the way to the modes gone again (`response_redraw`).
 
 Over repeated tests the truth lies within ±2 of them about 95 % of the time, as long as the method itself has no
-bias to speak of; where noise is redrawn, what it shifts on average counts as part of them. Without noise they are zero or of the size of rounding. The scatter of a mode over model
-orders is something else and tells nothing about its error.
+bias to speak of; where noise is redrawn, what it shifts on average counts as part of them. Without noise they are
+zero or of the size of rounding. The scatter of a mode over model orders is something else and tells nothing about
+its error.
 """
 
 from __future__ import annotations
