@@ -96,16 +96,16 @@ def cause_slopes(
     """Derivative of the residual by every variable of the causes, (n_variables, n_outputs, n_total)."""
     slopes = []
     for i, cause in enumerate(causes):
-        for j in range(cause.n):
+        for j, name in enumerate(cause.guess.scale):
+            # A delay jumps where it passes a whole sample: the smaller slope is the one that does not cross.
             sides = []
-            for step in (CAUSE_STEP, -CAUSE_STEP):
+            for step in (CAUSE_STEP, -CAUSE_STEP) if name == "delay" else (CAUSE_STEP,):
                 values = cause.values.copy()
                 values[j] += step
                 moved = [*causes[:i], cause.at(values), *causes[i + 1 :]]
                 sides.append(
                     (misfit.residual(theta, moved, observer=observer, n_train=n_train) - residual) / step
                 )
-            # A delay jumps where it passes a whole sample: the smaller slope is the one that does not cross.
             slopes.append(min(sides, key=lambda side: float(np.nan_to_num(np.sum(side**2), nan=np.inf))))
     return np.array(slopes).reshape(-1, *residual.shape)
 
@@ -157,12 +157,14 @@ def fit(
         fresh = age == 0
         age += 1
         J = np.concatenate([slopes, cause_slopes(misfit, theta, causes, observer, e, n_train)])
+        # Where a step to the side diverges, nothing is known of that variable and it stays.
+        J[~np.all(np.isfinite(J), axis=(1, 2))] = 0.0
         w = weights(e, misfit.colour)
         Jw = (J * w[:, None]).reshape(size, -1)
         information = Jw @ Jw.T
         H = information + prior
         g = Jw @ (e * w[:, None]).ravel() + prior[:, :n] @ theta
-        if not (np.all(np.isfinite(H)) and np.all(np.isfinite(g))):
+        if not (np.isfinite(f) and np.all(np.isfinite(H))):
             break
         # A cause can stop at an edge, such as a delay of a whole sample: then the parameters go on without it.
         for free in (np.arange(size), np.arange(n)) if causes else (np.arange(size),):

@@ -196,6 +196,8 @@ def _convolved(h: Array, f: Array) -> Array:
 def _deconvolved(h: Array, e: Array, weight: Array, scale: float) -> Array:
     """The force f that explains e as h * f: least squares, with a prior of white force of RMS `scale` [N]."""
     n = e.shape[1]
+    if not scale > 0:
+        return np.zeros(n)
     size = scipy.fft.next_fast_len(2 * n, real=True)
     H = scipy.fft.rfft(h, size, axis=1)
 
@@ -206,7 +208,7 @@ def _deconvolved(h: Array, e: Array, weight: Array, scale: float) -> Array:
         back = np.conj(H) * scipy.fft.rfft(r, size, axis=1)
         return np.asarray(scipy.fft.irfft(back.sum(axis=0), size)[:n])
 
-    prior = 1 / max(scale, 1e-300) ** 2
+    prior = 1 / scale**2
     normal = scipy.sparse.linalg.LinearOperator(
         (n, n), matvec=lambda f: adjoint(weight**2 * response(f.ravel())) + prior * f.ravel(), dtype=float
     )

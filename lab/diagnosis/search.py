@@ -21,6 +21,8 @@ from lab.effects.effect import EVERYWHERE, Effect
 
 OWN_PARAMETERS = {"mass": "mass_change", "stiffness": "stiffness_change", "damping": "damping_change"}
 SCREEN_SAMPLES = 4096
+SCREEN_SUBSTEPS = 3
+"""Enough to rank causes by, where nothing else in the model has a law."""
 STEPPED_ON = 40
 """Hypotheses that get more than one step in the screening."""
 REFITTED, PER_CAUSE, POLISHED = 10, 2, 3
@@ -94,6 +96,8 @@ def screen(
     Beside them, the best score that each of many draws of mere noise would have given.
     """
     n_train = tuple(min(n, SCREEN_SAMPLES) for n in misfit.n_train)
+    if not misfit.plant(theta, present).laws:
+        misfit = replace(misfit, substeps=SCREEN_SUBSTEPS)
     e = misfit.residual(theta, present, observer=observer, n_train=n_train)
     slopes = np.concatenate(
         [
@@ -215,8 +219,10 @@ def search(
         for cause, place, direction, found in large_changes(misfit, present, effects)
         if not mends(effects[cause], place, [(each.kind, each.location) for each in causes], survey)
     ]
-    ranked = sorted(candidates, key=lambda c: -c.gain)
-    return ranked, quantile(lucky, misfit.parameters.n_factors)
+    ranked: dict[tuple[str, str], Candidate] = {}
+    for candidate in sorted(candidates, key=lambda c: -c.gain):
+        ranked.setdefault((candidate.cause, candidate.location), candidate)
+    return list(ranked.values()), quantile(lucky, misfit.parameters.n_factors)
 
 
 def _refitted(

@@ -39,7 +39,7 @@ def says(effect: Effect, quantities: Mapping[str, Quantity]) -> str:
     where = "everywhere" if effect.location == EVERYWHERE else f"at {effect.location.replace('|', ' and ')}"
     kind = " ".join((type(effect).__doc__ or "").split("\n\n")[0].split()).rstrip(".")
     sizes = ", ".join(
-        f"{name.replace('_', ' ')} = {q.value:.4g} ± {q.std:.2g}{'' if q.unit == '1' else ' ' + q.unit}"
+        f"{name.removesuffix('_hz').replace('_', ' ')} = {q.value:.4g} ± {q.std:.2g}{'' if q.unit == '1' else ' ' + q.unit}"
         for name, q in quantities.items()
         if name != "phase"
     )
