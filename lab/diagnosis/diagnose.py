@@ -32,7 +32,7 @@ from lab.diagnosis.revise import renamed, settled
 from lab.diagnosis.search import Candidate, search, wrong_parameters
 from lab.diagnosis.starts import best_starts, free_decays, starts_of, with_starts
 from lab.diagnosis.unlearnable import unlearnable
-from lab.diagnosis.whiteness import Whiteness, whiteness
+from lab.diagnosis.whiteness import Whiteness, patches, whiteness
 from lab.effects import EFFECTS
 from lab.effects.damping_change import DampingChange
 from lab.effects.edits import law_of, with_law, with_mass
@@ -142,13 +142,16 @@ def diagnose(
         first = first or candidates
         if not candidates or candidates[0].gain < threshold:
             break
-        state = _with(state, candidates[0], rig)
-        finely = _finely(state)
+        further = _with(state, candidates[0], rig)
+        finely = _finely(further)
         covered = known is not None and known.covers(finely.misfit, finely.fit)
-        left = whiteness(finely.fit.residual, inputs)
-        if len(state.accepted) > 1 and not left.passed:
-            state = _renamed(state, effects)
-            left = whiteness(_finely(state).fit.residual, inputs)
+        after = whiteness(finely.fit.residual, inputs)
+        if len(further.accepted) > 1 and not after.passed:
+            further = _renamed(further, effects)
+            after = whiteness(_finely(further).fit.residual, inputs)
+        if state.accepted and not covered and patches(left, after):
+            break
+        state, left = further, after
         if (left.passed or covered) and not any(c.gain > threshold for c in _still_wrong(state, effects)):
             break
     state = _finely(_without_idle(state))

@@ -16,6 +16,9 @@ MATTERS = 0.05
 """Share of a residual's power that must be predictable for it to count: in a long record any two simulators differ
 significantly, and what is below a twentieth of the noise nobody would miss in a prediction."""
 
+PATCHED = 0.5
+"""Share of what was left that a cause must take to be more than a patch."""
+
 
 @dataclass(frozen=True)
 class Whiteness:
@@ -28,6 +31,7 @@ class Whiteness:
         lag: in samples.
         with_input: number of the input it correlates with; None for its own past.
         share: of the residual's power that its past and the inputs predict, in the channel where that is most.
+        left: information in what they predict, over all channels [nat per sample].
     """
 
     largest: float
@@ -36,11 +40,26 @@ class Whiteness:
     lag: int
     with_input: int | None
     share: float
+    left: float
+
+    @property
+    def white(self) -> bool:
+        """Whether the residual passes for white noise."""
+        return self.largest <= self.limit
 
     @property
     def passed(self) -> bool:
         """Whether the residual passes for noise, or for so little more that nobody would miss it."""
-        return self.largest <= self.limit or self.share <= MATTERS
+        return self.white or self.share <= MATTERS
+
+
+def patches(before: Whiteness, after: Whiteness) -> bool:
+    """Whether a cause only patches what it does not explain: most of what was left is left with it, too.
+
+    A law that only resembles the one that was named leaves a little behind, of which any other cause takes a part; what causes
+    a residual takes nearly all of it.
+    """
+    return bool(not (before.white or after.white) and after.left > PATCHED * before.left)
 
 
 def whiteness(residual: Array, inputs: Array) -> Whiteness:
@@ -62,18 +81,19 @@ def whiteness(residual: Array, inputs: Array) -> Whiteness:
     tests = own.size + cross.size
     limit = float(scipy.stats.norm.isf(LEVEL / (2 * max(tests, 1))))
     k, i = np.unravel_index(np.argmax(np.abs(own)), own.shape)
-    share = _predictable(e, u)
-    best = Whiteness(float(np.sqrt(n) * np.abs(own[k, i])), limit, int(i), int(k) + 1, None, share)
+    shares = _predictable(e, u)
+    told = float(np.max(shares)), float(-np.sum(np.log1p(-np.clip(shares, 0.0, 1 - 1e-12))))
+    best = Whiteness(float(np.sqrt(n) * np.abs(own[k, i])), limit, int(i), int(k) + 1, None, *told)
     if cross.size:
         j, k, i = np.unravel_index(np.argmax(np.abs(cross)), cross.shape)
         size = float(np.sqrt(n) * np.abs(cross[j, k, i]))
         if size > best.largest:
-            best = Whiteness(size, limit, int(i), int(k), int(j), share)
+            best = Whiteness(size, limit, int(i), int(k), int(j), *told)
     return best
 
 
-def _predictable(e: Array, u: Array) -> float:
-    """Largest share of a channel's power that a regression on its past and on the inputs explains, adjusted for its size."""
+def _predictable(e: Array, u: Array) -> Array:
+    """Share of each channel's power that a regression on its past and on the inputs explains, adjusted for its size."""
     n = e.shape[1] - LAGS
     driven = [row[LAGS - k : LAGS - k + n] for row in u for k in range(LAGS)]
     shares = []
@@ -84,7 +104,7 @@ def _predictable(e: Array, u: Array) -> float:
         left = target - found @ regressors
         freedom = max(n - len(regressors), 1)
         shares.append(1 - (left @ left / freedom) / max(target @ target / n, 1e-300))
-    return float(max(shares))
+    return np.array(shares)
 
 
 def _normalized(rows: Array) -> Array:
