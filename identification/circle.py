@@ -54,13 +54,27 @@ class Circle:
 
 
 def all_lines(response: FrequencyResponse) -> tuple[float, float]:
-    """Band of a circle for all lines: up to half the sample rate, or to the last line where time is continuous."""
+    """Band of a circle for all lines: up to half the sample rate, or to the last line where time is continuous.
+
+    Args:
+        response: with its lines.
+
+    Returns:
+        Lowest and highest frequency [Hz].
+    """
     if response.dt:
         return 0.0, 0.5 / response.dt
     return float(response.frequency_hz[0]), float(response.frequency_hz[-1])
 
 
 def model_points(response: FrequencyResponse) -> Complex:
-    """Where the lines lie in the plane of the model's poles: z = exp(2πi f dt), or s = 2πi f."""
+    """Where the lines lie in the plane of the model's poles: z = exp(2πi f dt), or s = 2πi f.
+
+    Args:
+        response: sampled, or continuous in time.
+
+    Returns:
+        Shape (n_lines,).
+    """
     s = 2j * np.pi * response.frequency_hz
     return np.asarray(np.exp(s * response.dt) if response.dt else s, dtype=np.complex128)

@@ -11,10 +11,10 @@ import identification
 FOLDER = Path(identification.__file__).parent
 
 CHOICES = """
-around_the_order brief_warnings choose_method choose_orders choose_segments default_degree explanation family find_method
-find_peaks find_period first_settled gathered hankel_size leading_subspace matrix_model numerical_rank orders_within_rank
-output_error plan_hankel planned predict repeat require_channels resonance_band response_rank settle_orders
-shows_rank simulated start_values told_shift values_near
+all_lines around_the_order brief_warnings choose_method choose_orders choose_segments default_degree explanation
+family find_method find_peaks find_period first_settled gathered hankel_size leading_subspace matrix_model
+numerical_rank orders_within_rank output_error plan_hankel planned predict repeat require_channels resonance_band
+response_rank settle_orders shows_rank simulated start_values told_shift values_near
 """
 """Choices, checks, words, and the plumbing between methods."""
 
@@ -26,7 +26,7 @@ reference_rows spring_network transforms widths without_part
 
 ALGEBRA = """
 balance close_pairs cluster_scatter excited least_squares line_weight line_weights modal_gains modal_outputs
-modal_states noise_model oscillating recursion rms simulate solve_linear spectrum triangular unit_sizes
+modal_states model_points noise_model oscillating recursion rms simulate solve_linear spectrum triangular unit_sizes
 """
 """A line of algebra that the first line of the docstring is."""
 
