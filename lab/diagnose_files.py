@@ -13,7 +13,8 @@ from lab.diagnosis.outcome import Diagnosis
 from lab.diagnosis.spectral.diagnose import diagnose_spectra
 from lab.effects import EFFECTS
 from lab.effects.effect import Effect
-from lab.errors import FileError, LabError, UnknownNameError
+from lab.errors import LabError, UnknownNameError
+from lab.files.checksum import sha256_of
 from lab.files.diagnosis import save_diagnosis
 from lab.files.folder import output_folder
 from lab.files.model import load_model
@@ -116,13 +117,7 @@ def _named(path: str | Path, names: Names) -> Diagnosed:
     """Samples, or else frequency responses, with channels as the model names them."""
     if not only_responses(path):
         return renamed(load(path), names)
-    responses = load_responses(path)
-    if not responses.dt > 0:
-        raise FileError(
-            f"{path}: holds responses to forces that vary continuously, as analysers measure them; expected those to "
-            "forces held over each sample, or samples; import the time signals instead"
-        )
-    return renamed(responses, names)
+    return renamed(load_responses(path), names)
 
 
 def _widths(given: Mapping[str, float], rig: Rig) -> Mapping[str, float]:
@@ -147,17 +142,9 @@ def _facts(given: dict[str, str | Path | Names | None]) -> dict[str, str]:
     facts: dict[str, str] = {}
     for name, path in given.items():
         if isinstance(path, str | Path):
-            facts[name] = f"{path}{_checksum(Path(path))}"
+            own = f", SHA-256 {sha256_of(path)}" if Path(path).is_file() else ""  # a name has no file
+            facts[name] = f"{path}{own}"
     return facts
-
-
-def _checksum(path: Path) -> str:
-    import hashlib
-
-    if not path.is_file():
-        return ""
-    with path.open("rb") as file:
-        return f", SHA-256 {hashlib.file_digest(file, 'sha256').hexdigest()}"
 
 
 def _first_swings(diagnosis: Diagnosis, recording: Diagnosed) -> tuple[Motion, Motion] | None:

@@ -23,6 +23,7 @@ def survey_of(
     dt: float,
     duration: float,
     output_rms: Array,
+    top_hz: float | None = None,
     n_lines: int = 4096,
 ) -> Survey:
     """Covariances of motion under white forces of given power in the plant's inputs and then its tones.
@@ -32,7 +33,8 @@ def survey_of(
         twin: its arrays.
         plant: at the parameters of the day.
         power: variance of every input and tone, (n_inputs + n_tones,).
-        dt: sample time [s].
+        dt: sample time [s]; zero for forces that vary continuously.
+        top_hz: highest frequency of the forces [Hz]; half the sample rate when None.
         duration: of the longest record [s].
         output_rms: of each recorded output.
         n_lines: frequencies over which spectra are summed.
@@ -49,12 +51,13 @@ def survey_of(
         order=(),
     )
     # Denser where the resonances of slow structures are.
-    edges = 0.5 / dt * np.linspace(0, 1, n_lines + 1) ** 2
+    top = 0.5 / dt if top_hz is None else top_hz
+    edges = top * np.linspace(0, 1, n_lines + 1) ** 2
     f, width = (edges[1:] + edges[:-1]) / 2, np.diff(edges)
     H = plant_response(probe, f, dt=dt) * np.sqrt(power)
 
     def covariance(rows: slice) -> Array:
-        X = H[:, rows].transpose(1, 0, 2).reshape(n, -1) * np.repeat(np.sqrt(2 * dt * width), power.size)
+        X = H[:, rows].transpose(1, 0, 2).reshape(n, -1) * np.repeat(np.sqrt(width / top), power.size)
         return np.asarray((X @ X.conj().T).real)
 
     acceleration = covariance(slice(2 * n, 3 * n))
@@ -72,6 +75,6 @@ def survey_of(
         4 * np.sqrt(power[: len(plant.inputs)]),
         none,
         (),
-        dt,
+        0.5 / top,
         duration,
     )

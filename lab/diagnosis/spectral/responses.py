@@ -61,7 +61,7 @@ class ResponseLikelihood:
         values: (n_f, n_outputs, n_inputs).
         spread: standard deviation of each value but for one factor per pair, likewise.
         decay: rate of the exponential window behind the responses [1/s].
-        dt: sample time [s].
+        dt: sample time [s]; zero for forces that vary continuously.
     """
 
     twin: Twin
@@ -174,6 +174,7 @@ class Responses:
             dt=r.dt,
             duration=1 / np.min(np.diff(r.frequency_hz)),
             output_rms=rms,
+            top_hz=None if r.dt else float(r.frequency_hz[-1]),
         )
         none = np.zeros(0)
         found = ResponseLikelihood(

@@ -9,12 +9,11 @@ from numpy.typing import NDArray
 
 from identification.recording import Array
 from lab import forces
+from lab.diagnosis.spectral.continuous import behind_limits, continuous_response
+from lab.diagnosis.spectral.modal_sum import modal_sum
 from lab.plant import Plant, ready
 
 Complex = NDArray[np.complex128]
-
-WORST_BASIS = 1e7
-"""Condition of the eigenvectors beyond which they are no basis to compute in."""
 
 
 def plant_response(plant: Plant, frequency_hz: Array | Complex, *, dt: float) -> Complex:
@@ -27,14 +26,17 @@ def plant_response(plant: Plant, frequency_hz: Array | Complex, *, dt: float) ->
     Args:
         plant: structure and chain.
         frequency_hz: shape (n_f,) [Hz]; complex for responses under an exponential window.
-        dt: sample time [s].
+        dt: sample time [s]; zero for forces that vary continuously (`continuous_response`).
 
     Source: Åström and Wittenmark (1997), Computer-Controlled Systems, eq. (2.6): H(z) = C (z I - F)⁻¹ G + D.
     """
+    s = np.asarray(2j * np.pi * frequency_hz, dtype=np.complex128)
     linear = replace(plant, laws=())
+    if not dt:
+        return continuous_response(linear, s)
     F, G, *_, C, D, _ = ready(linear, dt).matrices
-    z = np.exp(2j * np.pi * np.asarray(frequency_hz) * dt)
-    H = _resolved(z, F, G[0], C) + D
+    z = np.exp(s * dt)
+    H = modal_sum(z, F, G[0], C) + D
     n_in = len(plant.inputs)
     late = [i for i, path in enumerate(plant.input_paths) if path.parts(dt)[1]]
     sources = [*range(n_in), *late]
@@ -45,7 +47,7 @@ def plant_response(plant: Plant, frequency_hz: Array | Complex, *, dt: float) ->
         samples = whole + (part > 0) if column < n_in else whole
         driven[:, :, i] += H[:, :, column] * (_before(plant, i, z, dt) * z**-samples)[:, None]
     driven[:, :, n_in:] = H[:, :, len(sources) :]
-    return _recorded(plant, driven, z, dt)
+    return behind_limits(plant, _recorded(plant, driven, z, dt), s)
 
 
 def at_time(plant: Plant, share: float) -> Plant:
@@ -60,17 +62,6 @@ def at_time(plant: Plant, share: float) -> Plant:
 def drifts(plant: Plant) -> bool:
     """Whether a spring of the plant changes over the record."""
     return any(law.kind == forces.DRIFT for law in plant.laws)
-
-
-def _resolved(z: Complex, F: Array, G: Array, C: Array) -> Complex:
-    """C (z I - F)⁻¹ G at every z, by modes where they are a good basis."""
-    values, V = np.linalg.eig(F)
-    if np.linalg.cond(V) < WORST_BASIS:
-        residues = (C @ V).T[:, :, None] * np.linalg.solve(V, G.astype(complex))[:, None, :]
-        flat = (1 / (z[:, None] - values)) @ residues.reshape(values.size, -1)
-        return np.asarray(flat.reshape(z.size, C.shape[0], G.shape[1]))
-    shifted = z[:, None, None] * np.eye(F.shape[0]) - F
-    return np.asarray(C @ np.linalg.solve(shifted, np.broadcast_to(G, (z.size, *G.shape)).astype(complex)))
 
 
 def _before(plant: Plant, channel: int, z: Complex, dt: float) -> Complex:

@@ -1,0 +1,64 @@
+"""Continuous: the frequency response of a plant to forces that vary continuously, as analysers measure it."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from identification.recording import Array
+from lab.diagnosis.spectral.modal_sum import modal_sum
+from lab.paths import Path
+from lab.plant import Plant
+
+Complex = NDArray[np.complex128]
+
+
+def continuous_response(plant: Plant, s: Complex) -> Complex:
+    """Transfer function of the plant's linear part from its inputs and then its tones, (n_s, n_outputs, n_inputs + n_tones).
+
+    No force is held over a sample and nothing is folded: y = (L_d + s L_v + s² L_a) (M s² + C_d s + K)⁻¹ B u, with the
+    gains, lags and delays of the channels as they are in continuous time. A lag that a digital filter makes is that of the
+    filter's limit at ever shorter samples, and a band limit lies above all frequencies.
+
+    Args:
+        plant: structure and chain.
+        s: complex frequencies [rad/s], (n_s,).
+
+    Source: Ewins (2000), Modal Testing, 2nd ed., section 2.5, viscous damping.
+    """
+    tones = np.array([tone.row for tone in plant.tones]).reshape(-1, plant.n_dofs).T
+    X = receptance(plant, s, np.hstack([plant.forces, tones]))
+    H = sum(
+        s[:, None, None] ** power * (rows @ X)
+        for power, rows in enumerate((plant.displacement, plant.velocity, plant.acceleration))
+    )
+    pushed = np.ones((s.size, X.shape[2]), dtype=complex)
+    for i, path in enumerate(plant.input_paths):
+        pushed[:, i] = _through(path, s)
+    read = np.stack([_through(path, s) for path in plant.output_paths], axis=1)
+    H = read[:, :, None] * H * pushed[:, None, :]
+    return behind_limits(plant, H[:, list(plant.order)] if plant.order else H, s)
+
+
+def receptance(plant: Plant, s: Complex, forces: Array) -> Complex:
+    """(M s² + C_d s + K)⁻¹ times forces (n_dofs, m), shape (n_s, n_dofs, m)."""
+    n = plant.n_dofs
+    # Velocities in units of a typical frequency keep the eigenvectors a good basis.
+    omega = np.sqrt(np.linalg.norm(plant.stiffness) / np.linalg.norm(plant.mass)) or 1.0
+    inverse = np.linalg.solve(plant.mass, np.hstack([plant.stiffness / omega, plant.damping, forces / omega]))
+    A = np.block([[np.zeros((n, n)), omega * np.eye(n)], [-inverse[:, :n], -inverse[:, n : 2 * n]]])
+    B = np.vstack([np.zeros(forces.shape), inverse[:, 2 * n :]])
+    return modal_sum(s, A, B, np.eye(n, 2 * n))
+
+
+def behind_limits(plant: Plant, H: Complex, s: Complex) -> Complex:
+    """Recorded responses with the lags and delays that channels have behind an ideal anti-alias filter."""
+    factors = np.ones(H.shape[:2], dtype=complex)
+    for i, path in enumerate(plant.output_paths):
+        factors[:, i] = np.exp(-s * path.band_limited_delay) / (1 + s * path.band_limited_lag)
+    return np.asarray(factors[:, :, None] * H)
+
+
+def _through(path: Path, s: Complex) -> Complex:
+    """What gain, lags and delay of a channel do to a sine."""
+    return np.asarray(path.gain * np.exp(-s * path.delay) / ((1 + s * path.lag) * (1 + s * path.held_lag)))
