@@ -9,9 +9,9 @@ from typing import Any
 import numpy as np
 
 from identification.recording import Array
-from lab import catalogue
-from lab.errors import LabError, RigError
+from lab.errors import LabError
 from lab.files.folder import output_folder
+from lab.files.model import load_model
 from lab.files.placement import save_placement
 from lab.placement.outcome import Placement
 from lab.placement.place import place
@@ -84,13 +84,8 @@ def _rig(model: str | Path | None, scenario: Scenario | None) -> Rig:
     if model is None:
         if scenario is None:
             raise LabError("neither a model nor a scenario is given; give --model MODEL.xml")
-        path = scenario.model_file()
-    else:
-        path = Path(model) if Path(model).exists() else catalogue.find("models", str(model))
-    try:
-        return Rig.load(path)
-    except RigError as error:
-        raise RigError(f"{error} (in {path})") from None
+        model = scenario.model_file()
+    return load_model(model)
 
 
 def _frequencies(rig: Rig, n_sensors: int, settings: Mapping[str, Any]) -> Array:

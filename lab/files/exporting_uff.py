@@ -48,14 +48,10 @@ def _points(given: Given, channels: tuple[Channel, ...]) -> Points:
     if given.points is not None:
         return load_points(given.points)
     if given.model is not None:
-        from lab import catalogue
         from lab.files.exporting_model import model_points
-        from lab.rig import Rig
+        from lab.files.model import load_model
 
-        path = Path(given.model)
-        return model_points(
-            Rig.load(path if path.is_file() else catalogue.find("models", given.model)), channels
-        )
+        return model_points(load_model(given.model), channels)
     points = named_points(channels)
     geometry = None if given.recording is None else load_geometry(given.recording)
     return Points(points.places, geometry)

@@ -6,7 +6,6 @@ the last one, and is dropped. The journal is kept: `study.h5` is made from it.
 
 from __future__ import annotations
 
-import hashlib
 import json
 import os
 import time
@@ -18,6 +17,7 @@ from typing import Any, BinaryIO
 import numpy as np
 
 from lab.errors import FileError, StudyError
+from lab.files.checksum import sha256_of
 from lab.scenario import make_scenario
 from lab.studies.axes import changed
 from lab.studies.plan import Study
@@ -191,7 +191,7 @@ def _models(study: Study) -> dict[str, str]:
     found = {}
     for name in sorted(names):
         file = make_scenario(changed(study.scenario, {"model": name}), folder=study.folder).model_file()
-        found[name] = hashlib.sha256(file.read_bytes()).hexdigest()
+        found[name] = sha256_of(file)
     return found
 
 
