@@ -377,7 +377,7 @@ def test_causes_are_ranked_by_evidence(read):
     bars = np.array(read.static("/causes", "LineStrips2D:strips"))
     length = bars[:, 1, 0]
     assert length[0] > length[1] > length[2]
-    # As long as the power of ten: 1234.5 and 800.25.
+    # As long as the logarithm of the evidence: 1234.5 and 800.25.
     assert length[1] / length[0] == pytest.approx(math.log10(801.25) / math.log10(1235.5), rel=1e-6)
     texts = read.static("/causes/names", "Points2D:labels")
     assert texts[0] == "found: cubic stiffness at spring0_1, 1234"

@@ -39,7 +39,7 @@ def log_ranking(stream: rr.RecordingStream, diagnosis: Diagnosis) -> list[rrb.Vi
     bounds = rrb.VisualBounds2D(
         x_range=(-0.05 * WIDTH, 1.05 * WIDTH), y_range=(-0.3 * STEP, STEP * (len(ranked) + 0.2))
     )
-    name = "Causes by evidence, a natural logarithm (bars: the power of ten of it)"
+    name = "Causes by evidence (bars on a logarithmic scale)"
     return [rrb.Spatial2DView(origin=ORIGIN, name=name, visual_bounds=bounds)]
 
 
