@@ -13,18 +13,18 @@ from identification.errors import IdentificationError, RecordingError
 from identification.explanation import explanation
 from identification.found import Found, matrices_of
 from identification.found_bars import error_bars
+from identification.markov_methods import MARKOV_METHODS
 from identification.methods import find_method
 from identification.modes import Modes
 from identification.output_only import horizon_warning
 from identification.recording import Recording
 from identification.refinement import Refinement, refinement
-from identification.response_methods import RESPONSE_METHODS
 from identification.settled import NESTED, brief_warnings, settle
 from identification.stability import Stabilization, stabilize
 from identification.systems import Realization, SecondOrder
 from identification.uncertainty import Placed
 
-HANKEL = (*NESTED, *(name for name in RESPONSE_METHODS if name != "era_dc"))
+HANKEL = (*NESTED, *(name for name in MARKOV_METHODS if name != "era_dc"))
 """Methods whose horizon is the block rows and columns of one Hankel matrix."""
 
 

@@ -10,10 +10,7 @@ from typing import Any
 from identification.errors import IdentificationError
 from identification.fdd import efdd
 from identification.frequency_domain import plscf_recording
-from identification.next_era import next_era
-from identification.okid import okid_era
-from identification.recording import Recording
-from identification.response_methods import (
+from identification.markov_methods import (
     around_the_order,
     era_dc_recording,
     era_recording,
@@ -21,6 +18,9 @@ from identification.response_methods import (
     mmrtd_recording,
     mrtd_recording,
 )
+from identification.next_era import next_era
+from identification.okid import okid_era
+from identification.recording import Recording
 from identification.ssi import ssi_cov
 from identification.ssi_data import ssi_data
 from identification.systems import Realization

@@ -4,7 +4,7 @@
 - `okid_era`: the noise redrawn, and the whole way gone again (`observer_redraw`).
 - `ssi_cov`, `ssi_data`, `next_era`: the record's own randomness, as the mean of a series in time (`covariance_scatter`).
 - `plscf` and `efdd`: the noise redrawn, or pieces left out (`spectral_scatter`).
-- `era_dc`, `itd`, `mrtd`, `mmrtd`: the noise redrawn, and the way to the modes gone again (`response_redraw`).
+- `era_dc`, `itd`, `mrtd`, `mmrtd`: the noise redrawn, and the way to the modes gone again (`markov_redraw`).
 
 Over repeated tests the truth lies within ±2 of them about 95 % of the time, as long as the method itself has no
 bias to speak of; where noise is redrawn, what it shifts on average counts as part of them. Without noise they are
@@ -23,13 +23,13 @@ import numpy as np
 from identification.covariance_scatter import covariance_scatter
 from identification.error_bars import modes_with_std
 from identification.errors import IdentificationError
+from identification.markov_redraw import markov_scatter
 from identification.matrix_scatter import matrices_with_std
 from identification.modes import Modes
 from identification.observer_redraw import matrix_model, observer_scatter
 from identification.parameterizations import Tangent
 from identification.pulse_scatter import pulse_tangent
 from identification.recording import Array, Recording
-from identification.response_redraw import response_scatter
 from identification.settled import NESTED
 from identification.spectral_scatter import SPECTRAL, Tracks, spectral_std
 from identification.systems import Realization, SecondOrder
@@ -67,7 +67,7 @@ def modes_with_error_bars(
         IdentificationError: the records or the model allow no error bars; says why.
 
     Source: as for `pulse_tangent`, `observer_scatter`, `covariance_scatter`, `spectral_std` and
-        `response_scatter`.
+        `markov_scatter`.
     """
     if places is None:
         places = [Placed(realization.order, complex(pole)) for pole in modes.poles]
@@ -85,7 +85,7 @@ def modes_with_error_bars(
     elif realization.method in SPECTRAL:
         std = spectral_std(recording, realization, Tracks.of_places(places), settings=given)[:2]
     else:
-        std = response_scatter(recording, realization, places)[:2]
+        std = markov_scatter(recording, realization, places)[:2]
     return replace(modes, frequency_std=std[0], damping_std=std[1])
 
 

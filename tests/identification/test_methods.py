@@ -7,9 +7,9 @@ import numpy as np
 import pytest
 
 from identification.errors import IdentificationError, RecordingError
+from identification.markov_methods import shows_rank
 from identification.methods import METHODS, find_method
 from identification.recording import KINDS, Recording
-from identification.response_methods import shows_rank
 from identification.systems import Realization
 from tests.ambient import ambient, output_record
 from tests.systems import chain3, chain7, noisy, paper_chain3, pulse_recording, recorded

@@ -8,11 +8,11 @@ import numpy as np
 import pytest
 
 from identification.identify import identify
+from identification.markov_methods import MARKOV_METHODS
+from identification.markov_redraw import markov_scatter
 from identification.methods import METHODS
 from identification.recording import Record
 from identification.residual_scatter import DRAWS
-from identification.response_methods import RESPONSE_METHODS
-from identification.response_redraw import response_scatter
 from tests.systems import noisy, paper_chain3, pulse_recording
 
 TRUTH = paper_chain3().modes()
@@ -26,7 +26,7 @@ def with_noise(level, seed, n_samples=200):
 
 
 def test_all_of_them_are_methods_of_a_recording():
-    assert RESPONSE_METHODS.keys() <= METHODS.keys()
+    assert MARKOV_METHODS.keys() <= METHODS.keys()
 
 
 @pytest.mark.parametrize("name", ["itd", "mrtd", "mmrtd"])
@@ -62,13 +62,13 @@ def test_without_noise_the_bars_are_rounding():
     recording = pulse_recording(paper_chain3(), 200)
     found = METHODS["mrtd"](recording, 6)
     places = [(6, complex(pole)) for pole in found.system.modes().poles]
-    assert np.max(response_scatter(recording, found, places)[:2]) < 1e-9
+    assert np.max(markov_scatter(recording, found, places)[:2]) < 1e-9
 
 
 def test_a_mode_is_read_at_the_order_where_it_stands():
     recording = with_noise(0.01, 2)
     found = METHODS["mrtd"](recording, 6, orders=[6, 8])
     pole = complex(found.at(6).modes().poles[0])
-    low, high = (np.array(response_scatter(recording, found, [(order, pole)])[:2]) for order in (6, 8))
+    low, high = (np.array(markov_scatter(recording, found, [(order, pole)])[:2]) for order in (6, 8))
     assert np.all(np.isfinite(low))
     assert not np.array_equal(low, high)

@@ -9,16 +9,16 @@ from dataclasses import replace
 import numpy as np
 
 from identification.errors import IdentificationError
+from identification.markov_methods import MARKOV_METHODS
 from identification.pulse import markov_parameters
 from identification.pulse_scatter import residual_std
 from identification.recording import Array, Recording
 from identification.residual_scatter import DRAWS, scatter_of
-from identification.response_methods import RESPONSE_METHODS
 from identification.spectral_scatter import Bars, values_near
 from identification.systems import Realization
 
 
-def response_scatter(
+def markov_scatter(
     recording: Recording, realization: Realization, places: Sequence[tuple[int, complex]]
 ) -> Bars:
     """Standard deviations of frequencies and damping ratios, with what noise shifts on average in them.
@@ -27,7 +27,7 @@ def response_scatter(
 
     Args:
         recording: the one that was realized.
-        realization: by a method of `RESPONSE_METHODS`.
+        realization: by a method of `MARKOV_METHODS`.
         places: order and continuous-time pole [rad/s] of each mode.
 
     Returns:
@@ -40,7 +40,7 @@ def response_scatter(
     """
     markov, system = markov_parameters(recording), realization.system
     std, clean = residual_std(markov, system), system.markov(markov.n_lags).values
-    method = RESPONSE_METHODS[realization.method]
+    method = MARKOV_METHODS[realization.method]
     known = inspect.signature(method).parameters
     settings = {name: value for name, value in realization.settings.items() if name in known}
     orders, poles = np.array([order for order, _ in places]), np.array([pole for _, pole in places])

@@ -51,7 +51,7 @@ def itd_real(
     return Realization("itd", systems, H.S, order, {"n_rows": n_rows, "n_columns": n_columns}, notes)
 
 
-RESPONSE_METHODS: dict[str, Callable[..., Realization]] = {
+MARKOV_METHODS: dict[str, Callable[..., Realization]] = {
     "era": era,
     "era_dc": era_dc,
     "itd": itd_real,
@@ -217,7 +217,7 @@ def _realized(
     markov = markov_parameters(recording)
 
     def realize(order: int | None, orders: Iterable[int] | None) -> Realization:
-        found = RESPONSE_METHODS[name](markov, order, orders=orders, **settings)
+        found = MARKOV_METHODS[name](markov, order, orders=orders, **settings)
         return replace(found, method=name)
 
     return around_the_order(realize, order, orders)
