@@ -10,9 +10,9 @@ from collections.abc import Mapping
 from dataclasses import dataclass, fields, replace
 from typing import Any, ClassVar
 
-from lab.chain import ALL, Delay, Dropout, Gain, Lag, LowPass, Noise, Resolution, Saturation, Stage
 from lab.errors import LabError, UnknownNameError
 from lab.rig import Rig
+from lab.stages import ALL, Delay, Dropout, Gain, Lag, LowPass, Noise, Resolution, Saturation, Stage
 
 G = 9.80665
 """Standard gravity [m/s^2]."""

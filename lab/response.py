@@ -8,8 +8,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from identification.recording import DERIVATIVE, Array
-from lab.chain import Process
 from lab.rig import Rig
+from lab.stages import Process
 from lab.stepping import Stepper
 
 

@@ -12,12 +12,12 @@ import numpy as np
 
 from identification.recording import Array, Record, Recording
 from lab import stepping
-from lab.chain import Process
 from lab.errors import LabError
 from lab.excitation import BLOCK, Excitation, Load, Sampling
 from lab.files.recording import RecordingWriter, load
 from lab.response import Part, Response, fresh_sensors, sensed, through
 from lab.rig import Rig
+from lab.stages import Process
 from lab.stepping import Plan, Stepper
 
 PILOT_SAMPLES, MOST_PILOT_SAMPLES = 256, 4096

@@ -20,9 +20,9 @@ from mujoco import rollout
 
 from identification.recording import Array
 from lab import laws, mjcf
-from lab.chain import Delay
 from lab.errors import DivergedError
 from lab.rig import Rig
+from lab.stages import Delay
 
 STATE = mujoco.mjtState.mjSTATE_FULLPHYSICS
 CONTROL = mujoco.mjtState.mjSTATE_CTRL | mujoco.mjtState.mjSTATE_QFRC_APPLIED

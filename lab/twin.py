@@ -9,8 +9,7 @@ import mujoco
 import numpy as np
 
 from identification.recording import DERIVATIVE, Array
-from lab import chain as stages
-from lab import forces, laws, linearize
+from lab import forces, laws, linearize, stages
 from lab.errors import RigError
 from lab.paths import ORDER, Path
 from lab.plant import Law, Plant, Tone

@@ -6,11 +6,11 @@ import math
 from dataclasses import dataclass
 from typing import ClassVar
 
-from lab.chain import HeldLag, Lag
 from lab.effects.effect import AtInput, Effect
 from lab.effects.survey import Guess, Survey
 from lab.plant import Plant
 from lab.rig import Rig
+from lab.stages import HeldLag, Lag
 
 
 @dataclass(frozen=True)

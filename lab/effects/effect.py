@@ -12,13 +12,13 @@ from dataclasses import dataclass, fields, replace
 from typing import Any, ClassVar
 
 from identification.recording import Channel
-from lab.chain import ALL, Stage
 from lab.effects.edits import law_of
 from lab.effects.survey import Guess, Survey
 from lab.errors import LabError, UnknownNameError
 from lab.paths import ORDER
 from lab.plant import Plant
 from lab.rig import Rig
+from lab.stages import ALL, Stage
 
 EVERYWHERE = "*"
 """Location of a change by one common factor."""

@@ -7,11 +7,11 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any, ClassVar
 
-from lab.chain import Hum
 from lab.effects.effect import AtOutput, Effect
 from lab.effects.survey import Guess, Survey
 from lab.plant import Plant
 from lab.rig import Rig
+from lab.stages import Hum
 
 
 @dataclass(frozen=True)

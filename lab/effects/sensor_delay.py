@@ -5,11 +5,11 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import ClassVar
 
-from lab.chain import BandLimitedDelay, Delay
 from lab.effects.effect import AtOutput, Effect
 from lab.effects.survey import Guess, Survey
 from lab.plant import Plant
 from lab.rig import Rig
+from lab.stages import BandLimitedDelay, Delay
 
 
 @dataclass(frozen=True)

@@ -5,11 +5,11 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import ClassVar
 
-from lab.chain import Gain
 from lab.effects.effect import AtOutput, Effect
 from lab.effects.survey import Guess, Survey
 from lab.plant import Plant
 from lab.rig import Rig
+from lab.stages import Gain
 
 
 @dataclass(frozen=True)

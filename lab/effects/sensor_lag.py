@@ -6,11 +6,11 @@ import math
 from dataclasses import dataclass
 from typing import ClassVar
 
-from lab.chain import BandLimitedLag, Lag
 from lab.effects.effect import AtOutput, Effect
 from lab.effects.survey import Guess, Survey
 from lab.plant import Plant
 from lab.rig import Rig
+from lab.stages import BandLimitedLag, Lag
 
 
 @dataclass(frozen=True)

@@ -7,13 +7,13 @@ from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from typing import Any, ClassVar
 
-from lab.chain import Hum, Noise
 from lab.effects.edits import body_number
 from lab.effects.effect import AtBody, Effect
 from lab.effects.survey import Guess, Survey
 from lab.errors import LabError
 from lab.plant import Plant, Tone
 from lab.rig import Rig
+from lab.stages import Hum, Noise
 
 
 @dataclass(frozen=True)

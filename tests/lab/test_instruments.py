@@ -7,11 +7,12 @@ import numpy as np
 import pytest
 
 import lab
-from lab.chain import ALL, Chain, Delay, Dropout, Gain, Lag, LowPass, Noise, Resolution, Saturation
+from lab.chain import Chain
 from lab.errors import LabError, UnknownNameError
 from lab.excitation import Random
 from lab.instruments import PRESETS, instrument
 from lab.rig import Rig
+from lab.stages import ALL, Delay, Dropout, Gain, Lag, LowPass, Noise, Resolution, Saturation
 from tests.lab.structures import oscillator
 
 RIG = Rig.from_xml(oscillator()).connected(outputs=["pos", "vel", "acc.x"])

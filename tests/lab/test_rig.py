@@ -10,10 +10,11 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from lab import instruments
-from lab.chain import Chain, Gain, Hum, Lag, Noise
+from lab.chain import Chain
 from lab.errors import FileError, RigError, UnknownNameError
 from lab.mjcf import number
 from lab.rig import Rig
+from lab.stages import Gain, Hum, Lag, Noise
 from tests.lab.structures import LINEAR, MODELS, chain_matrices, chain_xml, held_response, model, oscillator
 
 CHAIN = Chain(

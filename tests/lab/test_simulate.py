@@ -14,12 +14,13 @@ import scipy.signal
 import lab
 from identification.systems import SecondOrder
 from lab import excitation, stepping
-from lab.chain import Chain, Delay, Dropout, Gain, Hum, Lag, LowPass, Noise, Resolution, Saturation
+from lab.chain import Chain
 from lab.errors import DivergedError, FileError, LabError
 from lab.excitation import Ambient, FreeDecay, Impact, Pulse, Random, Sampling
 from lab.files.recording import load
 from lab.rig import Rig
 from lab.simulate import DRIVE, motion, simulate_to_file
+from lab.stages import Delay, Dropout, Gain, Hum, Lag, LowPass, Noise, Resolution, Saturation
 from tests.lab.structures import (
     LINEAR,
     MODELS,

@@ -6,13 +6,13 @@ import numpy as np
 import pytest
 
 import lab
-from lab.chain import Gain, Lag, LowPass, Saturation
 from lab.effects import EFFECTS
 from lab.effects.edits import with_mass
 from lab.errors import RigError
 from lab.plant import ready
 from lab.rig import Rig
 from lab.simulate import simulate
+from lab.stages import Gain, Lag, LowPass, Saturation
 from lab.twin import twin
 from tests.lab import structures
 from tests.lab.effects.cases import CASES
