@@ -14,7 +14,7 @@ import os
 import sys
 import time
 from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from pathlib import Path
 
 # Matrices here are small: threads would cost more than they bring.
@@ -172,12 +172,7 @@ def run(setup: Setup, level: float, patterns: int, seed: int) -> MonteCarlo:
     results = MonteCarlo([], [], [], [], [], [])
     least_scatter = efficient(setup, level)
     for pattern in range(patterns):
-        rng = np.random.default_rng([seed, pattern])
-        records = tuple(
-            replace(record, outputs=systems.noisy(record.outputs, level, rng))
-            for record in setup.recording.records
-        )
-        noisy = replace(setup.recording, records=records)
+        noisy = systems.with_noise(setup.recording, level, np.random.default_rng([seed, pattern]))
         start = setup.start(noisy)
         results.ideal.append(least_scatter(noisy))
         results.plain.append(entries(second_order(start, dofs=setup.truth.dofs)))

@@ -11,7 +11,7 @@ from __future__ import annotations
 import sys
 import time
 from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
@@ -21,18 +21,18 @@ sys.path.insert(0, str(ROOT))
 
 from identification.identify import Identification, identify  # noqa: E402
 from identification.modes import Modes  # noqa: E402
-from identification.recording import Array, Record, Recording  # noqa: E402
+from identification.recording import Array, Recording  # noqa: E402
 from identification.systems import SecondOrder  # noqa: E402
 from tests.ambient import ambient  # noqa: E402
 from tests.systems import (  # noqa: E402
     chain3,
     chain7,
     instrumented,
-    noisy,
     paper_chain3,
     pulse_recording,
     recorded,
     sensors,
+    with_noise,
 )
 
 Generator = np.random.Generator
@@ -69,12 +69,6 @@ class Calibration:
     seconds: float
     matrix_ratio: Array | None
     matrix_coverage: Array | None
-
-
-def with_noise(recording: Recording, level: float, rng: Generator) -> Recording:
-    """The recording with white noise on its outputs."""
-    records = (Record(r.kind, r.inputs, noisy(np.asarray(r.outputs), level, rng)) for r in recording.records)
-    return replace(recording, records=tuple(records))
 
 
 def pulses(rng: Generator) -> Recording:

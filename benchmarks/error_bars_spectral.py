@@ -13,10 +13,10 @@ import numpy as np
 ROOT = Path(__file__).resolve().parent.parent
 sys.path.insert(0, str(ROOT))
 
-from benchmarks.error_bars import CHAIN3, CHAIN7, Case, Generator, calibrate, with_noise  # noqa: E402
+from benchmarks.error_bars import CHAIN3, CHAIN7, Case, Generator, calibrate  # noqa: E402
 from identification.recording import Recording  # noqa: E402
 from tests.ambient import ambient  # noqa: E402
-from tests.systems import chain3, paper_chain3, recorded  # noqa: E402
+from tests.systems import chain3, paper_chain3, recorded, with_noise  # noqa: E402
 
 
 def forced(rng: Generator) -> Recording:

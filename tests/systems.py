@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 
 import numpy as np
 
@@ -158,3 +159,10 @@ def noisy(values: Array, level: float, rng: np.random.Generator) -> Array:
     """The values with white noise of `level` times the RMS of each row (the last axis counts samples)."""
     rms = np.sqrt(np.mean(np.square(values), axis=-1, keepdims=True))
     return values + level * rms * rng.standard_normal(values.shape)
+
+
+def with_noise(recording: Recording, level: float, seed: int | np.random.Generator) -> Recording:
+    """The recording with such noise on its outputs."""
+    rng = np.random.default_rng(seed)
+    records = (replace(r, outputs=noisy(np.asarray(r.outputs), level, rng)) for r in recording.records)
+    return replace(recording, records=tuple(records))

@@ -1,14 +1,10 @@
 """The paragraph that explains a result."""
 
-from dataclasses import replace
-
-import numpy as np
-
 from identification.explanation import PHRASES, explanation
 from identification.identify import identify
 from identification.stability import RULES
 from tests.ambient import ambient
-from tests.systems import noisy, paper_chain3, pulse_recording
+from tests.systems import paper_chain3, pulse_recording, with_noise
 
 
 def test_every_rule_that_rejects_a_pole_has_a_phrase():
@@ -31,12 +27,8 @@ def test_it_tells_method_order_horizon_and_the_fate_of_every_pole():
 
 
 def test_modes_that_did_not_settle_are_counted_and_nothing_is_said_twice():
-    recording = pulse_recording(paper_chain3(), 200)
-    rng = np.random.default_rng(7)
-    records = (replace(r, outputs=noisy(np.asarray(r.outputs), 0.05, rng)) for r in recording.records)
-    found = identify(
-        replace(recording, records=tuple(records)), order=10, orders=range(2, 15, 2), uncertainty=False
-    )
+    recording = with_noise(pulse_recording(paper_chain3(), 200), 0.05, 7)
+    found = identify(recording, order=10, orders=range(2, 15, 2), uncertainty=False)
     loose = len(found.stable) - sum(found.stable)
     assert loose > 0
     assert f"{loose} mode{'s' if loose > 1 else ''} did not stay put" in found.explanation

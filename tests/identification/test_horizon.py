@@ -1,15 +1,13 @@
 """Resonance peaks in spectra, and what follows from them for the horizon and the orders."""
 
-from dataclasses import replace
-
 import numpy as np
 import pytest
 
 from identification.horizon import choose_orders, choose_rows, resonance_peaks
 from identification.identify import identify
-from identification.recording import Channel, Record, Recording
+from identification.recording import Channel, Recording
 from tests.ambient import DT, ambient, output_record
-from tests.systems import chain7, noisy, paper_chain3, pulse_recording
+from tests.systems import chain7, paper_chain3, pulse_recording, with_noise
 
 TRUTH = chain7().modes().frequency_hz
 
@@ -77,10 +75,7 @@ def test_rows_follow_the_slowest_peak_unless_something_else_asks_for_more():
 
 @pytest.mark.parametrize("seed", range(3))
 def test_too_short_a_horizon_is_useless_under_noise_and_said_to_be(seed):
-    rng = np.random.default_rng(seed)
-    clean = pulse_recording(paper_chain3(), 400)
-    records = tuple(Record(r.kind, r.inputs, noisy(r.outputs, 0.05, rng)) for r in clean.records)
-    recording = replace(clean, records=records)
+    recording = with_noise(pulse_recording(paper_chain3(), 400), 0.05, seed)
     slowest = paper_chain3().modes().frequency_hz[0]
 
     def identified(**horizon):

@@ -10,17 +10,19 @@ from identification.identify import choose_method, identify
 from identification.modes import mac
 from identification.recording import KINDS, Record, Recording
 from tests.ambient import ambient, output_record
-from tests.systems import chain3, chain7, noisy, paper_chain3, paper_truss, pulse_recording, recorded
+from tests.systems import (
+    chain3,
+    chain7,
+    paper_chain3,
+    paper_truss,
+    pulse_recording,
+    recorded,
+    with_noise,
+)
 
 
 def measured(recording, level, seed=7):
-    """The recording with noise on its outputs."""
-    rng = np.random.default_rng(seed)
-    records = tuple(
-        Record(record.kind, record.inputs, noisy(np.asarray(record.outputs), level, rng))
-        for record in recording.records
-    )
-    return replace(recording, records=records)
+    return with_noise(recording, level, seed)
 
 
 def of_kind(kind, *, inputs):

@@ -16,7 +16,7 @@ from identification.spring_network import WORLD, spring_network
 from identification.structures import Structure, free_matrices
 from identification.systems import SecondOrder, StateSpace
 from tests import systems
-from tests.systems import actuators, instrumented, noisy, sensors
+from tests.systems import actuators, instrumented, sensors, with_noise
 
 TRUTH = systems.chain3("coupled")
 SYSTEM = systems.paper_chain3("coupled")
@@ -29,13 +29,6 @@ ELEMENTS = np.array([0.8, 2.0, 1.2, 0.1, 0.2, 0.3, 0.2, 0.3, 0.1, 1.0, 1.0, 1.0,
 def random_recording(n_samples=400, n_records=1, seed=0):
     rng = np.random.default_rng(seed)
     return systems.recorded(SYSTEM, [rng.standard_normal((2, n_samples)) for _ in range(n_records)])
-
-
-def with_noise(recording, level, seed):
-    rng = np.random.default_rng(seed)
-    return replace(
-        recording, records=tuple(replace(r, outputs=noisy(r.outputs, level, rng)) for r in recording.records)
-    )
 
 
 def moved(structure, share, seed=0):

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
-
 import numpy as np
 import pytest
 
@@ -11,18 +9,14 @@ from identification.identify import identify
 from identification.markov_methods import MARKOV_METHODS
 from identification.markov_redraw import markov_scatter
 from identification.methods import METHODS
-from identification.recording import Record
 from identification.residual_scatter import DRAWS
-from tests.systems import noisy, paper_chain3, pulse_recording
+from tests.systems import paper_chain3, pulse_recording, with_noise
 
 TRUTH = paper_chain3().modes()
 
 
-def with_noise(level, seed, n_samples=200):
-    rng = np.random.default_rng(seed)
-    clean = pulse_recording(paper_chain3(), n_samples)
-    records = tuple(Record(r.kind, r.inputs, noisy(r.outputs, level, rng)) for r in clean.records)
-    return replace(clean, records=records)
+def pulses(level, seed):
+    return with_noise(pulse_recording(paper_chain3(), 200), level, seed)
 
 
 def test_all_of_them_are_methods_of_a_recording():
@@ -31,7 +25,7 @@ def test_all_of_them_are_methods_of_a_recording():
 
 @pytest.mark.parametrize("name", ["itd", "mrtd", "mmrtd"])
 def test_every_mode_and_matrix_has_an_error_bar_that_holds(name):
-    found = identify(with_noise(0.01, 0), name, order=6)
+    found = identify(pulses(0.01, 0), name, order=6)
     for values, truth, std in (
         (found.modes.frequency_hz, TRUTH.frequency_hz, found.modes.frequency_std),
         (found.modes.damping_ratio, TRUTH.damping_ratio, found.modes.damping_std),
@@ -45,7 +39,7 @@ def test_every_mode_and_matrix_has_an_error_bar_that_holds(name):
 
 
 def test_normal_forms_scatter_as_era_does():
-    recording = with_noise(0.01, 1)
+    recording = pulses(0.01, 1)
     size = {"n_rows": 60, "n_columns": 80}
     plain = identify(recording, "era", order=6, **size).modes
     # MRTD is ERA in output-normal form, and MMRTD in input-normal form: the same poles, and the same draws.
@@ -66,7 +60,7 @@ def test_without_noise_the_bars_are_rounding():
 
 
 def test_a_mode_is_read_at_the_order_where_it_stands():
-    recording = with_noise(0.01, 2)
+    recording = pulses(0.01, 2)
     found = METHODS["mrtd"](recording, 6, orders=[6, 8])
     pole = complex(found.at(6).modes().poles[0])
     low, high = (np.array(markov_scatter(recording, found, [(order, pole)])[:2]) for order in (6, 8))

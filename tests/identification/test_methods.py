@@ -12,7 +12,7 @@ from identification.methods import METHODS, find_method
 from identification.recording import KINDS, Recording
 from identification.systems import Realization
 from tests.ambient import ambient, output_record
-from tests.systems import chain3, chain7, noisy, paper_chain3, pulse_recording, recorded
+from tests.systems import chain3, chain7, paper_chain3, pulse_recording, recorded, with_noise
 
 KIND_OF = {
     "era": "pulse",
@@ -91,22 +91,13 @@ def test_forces_are_asked_for_where_they_are_needed():
         METHODS["okid_era"](ambient(500, 1))
 
 
-def with_noise(recording, level):
-    rng = np.random.default_rng(2)
-    records = [
-        type(record)(record.kind, record.inputs, noisy(np.asarray(record.outputs), level, rng))
-        for record in recording.records
-    ]
-    return Recording(tuple(records), recording.inputs, recording.outputs, recording.sample_rate)
-
-
 @pytest.mark.parametrize("name", ["era", "okid_era"])
 def test_exact_data_show_their_rank_and_noisy_data_are_swept(name):
     recording, _ = suited(METHODS[name])
     exact = METHODS[name](recording)
     assert shows_rank(exact)
     assert exact.orders == (6,)
-    measured = METHODS[name](with_noise(recording, 0.05))
+    measured = METHODS[name](with_noise(recording, 0.05, 2))
     assert not shows_rank(measured)
     assert measured.order == 6
     assert measured.orders == (2, 4, 6, 8, 10, 12)

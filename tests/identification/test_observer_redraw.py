@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
-
 import numpy as np
 import pytest
 
@@ -11,16 +9,10 @@ from identification.errors import IdentificationError
 from identification.identify import identify
 from identification.observer_redraw import matrix_model, observer_scatter
 from identification.okid import okid_era
-from identification.recording import Record
-from tests.systems import chain3, noisy, paper_chain3, pulse_recording, recorded
+from tests.systems import chain3, paper_chain3, pulse_recording, recorded, with_noise
 
 SYSTEM = paper_chain3()
 TRUTH = SYSTEM.modes()
-
-
-def with_noise(recording, level, rng):
-    records = tuple(Record(r.kind, r.inputs, noisy(r.outputs, level, rng)) for r in recording.records)
-    return replace(recording, records=records)
 
 
 def short_pulses(rng):

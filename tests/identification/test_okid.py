@@ -28,14 +28,6 @@ def random_recording(model, n_samples, seed=0, *, start=0.1, n_records=1):
     return systems.recorded(model, inputs, initial=starts)
 
 
-def with_noise(recording, level, seed):
-    rng = np.random.default_rng(seed)
-    records = [
-        replace(r, outputs=systems.noisy(np.asarray(r.outputs), level, rng)) for r in recording.records
-    ]
-    return replace(recording, records=tuple(records))
-
-
 def poles(system):
     return np.sort_complex(system.eigen()[0])
 
@@ -175,7 +167,7 @@ def test_float32_data_give_as_many_digits_as_they_hold():
 
 @pytest.mark.parametrize(("model", "order"), [(CHAIN3, 6), (TRUSS, 16)], ids=["chain3", "truss"])
 def test_five_per_cent_noise(model, order):
-    found = okid_era(with_noise(random_recording(model, 4000, 3, start=0), 0.05, 4))
+    found = okid_era(systems.with_noise(random_recording(model, 4000, 3, start=0), 0.05, 4))
     assert found.order == order
     assert "Akaike" in found.notes[0]
     assert "edge of the noise" in found.notes[1]
@@ -192,7 +184,9 @@ def test_error_falls_with_the_root_of_the_length():
     for n_samples in (4000, 16_000):
         e = []
         for seed in range(4):
-            recording = with_noise(random_recording(CHAIN3, n_samples, seed, start=0), 0.05, seed + 50)
+            recording = systems.with_noise(
+                random_recording(CHAIN3, n_samples, seed, start=0), 0.05, seed + 50
+            )
             e.append(poles(okid_era(recording, 6, observer=80).system) - poles(CHAIN3))
         errors.append(scipy.linalg.norm(e))
     # Four times the data, half the error; four seeds leave a factor of about 1.4 either way.
@@ -210,7 +204,7 @@ def test_further_orders_come_from_the_same_decomposition():
 
 
 def test_all_lengths_from_one_factor_equal_a_regression_for_each():
-    recording = with_noise(random_recording(CHAIN3, 300), 0.05, 1)
+    recording = systems.with_noise(random_recording(CHAIN3, 300), 0.05, 1)
     u, y = (np.asarray(x) for x in (recording.records[0].inputs, recording.records[0].outputs))
     v = np.vstack([u, y])
     for p in (1, 4, 9):
@@ -226,7 +220,7 @@ def test_all_lengths_from_one_factor_equal_a_regression_for_each():
 
 
 def test_blocks_of_a_long_record_join_without_a_seam():
-    recording = with_noise(random_recording(CHAIN3, 9000), 0.05, 1)
+    recording = systems.with_noise(random_recording(CHAIN3, 9000), 0.05, 1)
     whole = observe(recording, observer=5)
     record = recording.records[0]
     # The same rows from overlapping short records.
@@ -245,7 +239,7 @@ def test_blocks_of_a_long_record_join_without_a_seam():
 
 
 def test_fitted_inputs_equal_a_plain_regression():
-    recording = with_noise(random_recording(CHAIN3, 250, 2, n_records=2), 0.1, 3)
+    recording = systems.with_noise(random_recording(CHAIN3, 250, 2, n_records=2), 0.1, 3)
     fitted = fit_inputs(CHAIN3, recording)
     scale = np.sqrt(np.mean([np.mean(np.asarray(r.outputs) ** 2, axis=1) for r in recording.records], axis=0))
     A, C = CHAIN3.A, CHAIN3.C

@@ -46,12 +46,6 @@ def noisy(response, level, seed):
     return replace(response, values=response.values + size * (noise[0] + 1j * noise[1]))
 
 
-def noisy_recording(recording, level, seed):
-    rng = np.random.default_rng(seed)
-    records = [replace(r, outputs=systems.noisy(r.outputs, level, rng)) for r in recording.records]
-    return replace(recording, records=tuple(records))
-
-
 def ambient(structure, dt, n_samples, seed, noise=0.0):
     """Accelerations everywhere under white forces everywhere."""
     system = systems.instrumented(
@@ -224,7 +218,7 @@ def test_modes_and_response_at_five_per_cent_noise(kind):
         recording = systems.recorded(truth, inputs, kind=kind)
     else:
         recording = systems.recorded(truth, [rng.standard_normal((n, 24_000))])
-    recording = noisy_recording(recording, 0.05, 7)
+    recording = systems.with_noise(recording, 0.05, 7)
     modes = stabilize(plscf_recording(recording)).modes
     expected = truth.modes()
     assert len(modes) == 8
@@ -261,7 +255,7 @@ def test_white_noise_on_the_sensors_leaves_the_damping():
     clean = ambient(structure, 0.02, 50_000, 9)
     damping = [
         stabilize(plscf_recording(recording)).modes.damping_ratio
-        for recording in (clean, noisy_recording(clean, 1.0, 10))
+        for recording in (clean, systems.with_noise(clean, 1.0, 10))
     ]
     # Both see the same forces, so that only the scatter due to the noise remains.
     np.testing.assert_allclose(damping[1], damping[0], rtol=0.2)

@@ -10,18 +10,14 @@ from identification.identify import identify
 from identification.information import cramer_rao_bound
 from identification.recording import Record
 from tests.ambient import ambient
-from tests.systems import chain3, noisy, paper_chain3, recorded
+from tests.systems import chain3, paper_chain3, recorded, with_noise
 
 
 def shaken(*, n=1200, level=0.05, seed=0, initial=None):
     rng = np.random.default_rng(seed)
     system = paper_chain3("coupled")
     start = None if initial is None else [np.asarray(initial)]
-    recording = recorded(system, [rng.standard_normal((2, n))], initial=start)
-    records = (
-        Record("random", r.inputs, noisy(np.asarray(r.outputs), level, rng)) for r in recording.records
-    )
-    return replace(recording, records=tuple(records))
+    return with_noise(recorded(system, [rng.standard_normal((2, n))], initial=start), level, rng)
 
 
 TRUTH = chain3("coupled")

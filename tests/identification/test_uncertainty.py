@@ -18,18 +18,12 @@ from identification.identify import identify
 from identification.matrix_scatter import matrix_move
 from identification.parameterizations import Tangent
 from identification.pulse import markov_parameters
-from identification.recording import Record, Recording
+from identification.recording import Recording
 from identification.resampling import jackknife_std, without_part
 from identification.second_order import second_order
 from identification.series_scatter import std_of_sum
 from tests.ambient import ambient, output_record
-from tests.systems import noisy, paper_chain3, pulse_recording, recorded
-
-
-def with_noise(recording, level, seed):
-    rng = np.random.default_rng(seed)
-    records = tuple(Record(r.kind, r.inputs, noisy(r.outputs, level, rng)) for r in recording.records)
-    return replace(recording, records=records)
+from tests.systems import paper_chain3, pulse_recording, recorded, with_noise
 
 
 def one(tangent: Tangent, k: int) -> Tangent:
