@@ -60,6 +60,12 @@ class Ambient:
         return self.data[0].bands.dt
 
     @property
+    def band_hz(self) -> tuple[float, float]:
+        """Lowest and highest frequency of the data [Hz]."""
+        f = self.data[0].bands.frequency_hz
+        return float(f[0]), float(f[-1])
+
+    @property
     def counts(self) -> Array:
         """Lines averaged, (n_parts, n_bands)."""
         return np.stack([part.counts for part in self.data])

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import itertools
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -30,8 +30,8 @@ from lab.diagnosis.spectral.fit import SpectralFit, fit
 from lab.diagnosis.spectral.recorded import Recorded
 from lab.diagnosis.spectral.responses import Responses
 from lab.diagnosis.spectral.search import drifting, search
+from lab.diagnosis.spectral.stage import Stage, confirmed, predicted, settled, with_cause, without_idle
 from lab.diagnosis.spectral.tones import FoundTone
-from lab.diagnosis.spectral.transfer import Complex
 from lab.diagnosis.words import advice, says
 from lab.effects import EFFECTS
 from lab.effects.effect import Effect
@@ -39,31 +39,10 @@ from lab.rig import Rig
 from lab.twin import twin
 
 MOST_FINDINGS = 4
-DOUBT = 5.0
-"""By how much -2 log likelihood of data kept aside may rise by chance with a true cause."""
 FAR = 3.0
 """Standard deviations beyond which a calibrated parameter may hide a cause, so that the model as given is a better start."""
 RIGID = 1e12
 """Precision of a prior that lets a parameter not move."""
-
-
-@dataclass(frozen=True, eq=False)
-class Stage:
-    """How far a diagnosis of spectra has come.
-
-    Attributes:
-        experiment: the data, tones that were named taken out.
-        likelihood: of its training part.
-        fit: parameters, causes and nuisances so far.
-        accepted: causes so far.
-        held_out: error on data kept aside, of the calibrated model and after each cause.
-    """
-
-    experiment: Experiment
-    likelihood: Any
-    fit: SpectralFit
-    accepted: tuple[Candidate | FoundTone, ...]
-    held_out: tuple[float, ...]
 
 
 def diagnose_spectra(
@@ -122,11 +101,15 @@ def diagnose_spectra(
         ranked, looks = _ranked(stage, visible, given if not stage.accepted else None)
         if not ranked or ranked[0].gain < evidence_threshold(looks):
             break
-        step = _with(stage, ranked[0])
-        if not _confirmed(stage, step):
+        step = with_cause(stage, ranked[0])
+        better = settled(stage, step)
+        if better is not None:
+            stage, origin = better, origin if stage.accepted else better
+            continue
+        if not confirmed(stage, step):
             refused = ranked[0]
             break
-        first, stage = first or ranked, step
+        first, stage = first or ranked, without_idle(step)
     return _outcome(stage, origin, given, nominal, rig, first, refused)
 
 
@@ -165,15 +148,6 @@ def _tightened(parameters: Parameters, known: SpectralFit) -> Parameters:
     return replace(parameters, widths=np.maximum(parameters.widths * np.minimum(spread, 1.0), 1e-3))
 
 
-def _confirmed(before: Stage, after: Stage) -> bool:
-    """Whether data that no fit has seen are no less likely with the last cause than without."""
-    deviances = []
-    for stage in (before, after):
-        held_out = stage.experiment.held_out(stage.likelihood)
-        deviances.append(held_out.deviance(_predicted(held_out, stage.fit)))
-    return bool(deviances[1] < deviances[0] + DOUBT)
-
-
 def _ranked(
     stage: Stage, effects: Mapping[str, type[Effect]], given: SpectralFit | None
 ) -> tuple[list[Candidate | FoundTone], int]:
@@ -185,41 +159,14 @@ def _ranked(
         for name, kind in effects.items()
         if name not in ("stiffness_drift", "unmeasured_force", "line_hum")
     }
-    candidates, looks = search(stage.likelihood, stage.fit, steady, anchors=anchors)
+    # Where nothing is left that chance does not explain, no large change can hide.
+    large = bool(stage.experiment.left(stage.likelihood, predicted(stage.likelihood, stage.fit)))
+    candidates, looks = search(stage.likelihood, stage.fit, steady, anchors=anchors, large=large)
     tones, places = stage.experiment.tones(stage.likelihood, stage.fit, effects)
     parts = stage.experiment.in_parts(stage.likelihood) if "stiffness_drift" in effects else None
     drifts, springs = ([], 0) if parts is None else drifting(parts, stage.fit, effects["stiffness_drift"])
     found: list[Candidate | FoundTone] = [*candidates, *tones, *drifts]
     return sorted(found, key=lambda c: -c.gain), looks + places + springs
-
-
-def _with(stage: Stage, chosen: Candidate | FoundTone) -> Stage:
-    """The stage with one more cause accepted, everything refitted together."""
-    experiment, likelihood, start = stage.experiment, stage.likelihood, stage.fit
-    if isinstance(chosen, FoundTone):
-        experiment = experiment.without(chosen)
-        likelihood = experiment.again(likelihood)
-    else:
-        assert isinstance(chosen.fit, SpectralFit)
-        start = chosen.fit
-        if chosen.cause == "stiffness_drift":
-            likelihood = experiment.in_parts(likelihood)
-        if chosen.direction is not None:
-            likelihood = replace(likelihood, parameters=likelihood.parameters.lifted(chosen.direction))
-    refit = fit(likelihood, start.theta, start.causes, start.nuisance)
-    likelihood = experiment.surveyed(likelihood, refit.nuisance)
-    held_out = (*(stage.held_out or (_held_out_error(stage),)),)
-    found = Stage(experiment, likelihood, refit, (*stage.accepted, chosen), held_out)
-    return replace(found, held_out=(*held_out, _held_out_error(found)))
-
-
-def _held_out_error(stage: Stage) -> float:
-    held_out = stage.experiment.held_out(stage.likelihood)
-    return stage.experiment.error(held_out, _predicted(held_out, stage.fit))
-
-
-def _predicted(likelihood: Any, found: SpectralFit) -> Complex:
-    return np.asarray(likelihood.predict(found.theta, found.causes, found.nuisance))
 
 
 def _as_given(likelihood: Any, found: SpectralFit) -> SpectralFit:
@@ -259,13 +206,13 @@ def _outcome(
             extended = effect.apply(extended)
     kept = origin.experiment.held_out(origin.likelihood)
     clean = stage.experiment.held_out(stage.likelihood)
-    predicted = (_predicted(kept, given), _predicted(kept, origin.fit), _predicted(clean, stage.fit))
-    floor = stage.experiment.floor(clean, predicted[2])
+    shown = (predicted(kept, given), predicted(kept, origin.fit), predicted(clean, stage.fit))
+    floor = stage.experiment.floor(clean, shown[2])
     errors = Errors(
         floor,
-        origin.experiment.error(kept, predicted[0]),
-        origin.experiment.error(kept, predicted[1]),
-        stage.experiment.error(clean, predicted[2]),
+        origin.experiment.error(kept, shown[0]),
+        origin.experiment.error(kept, shown[1]),
+        stage.experiment.error(clean, shown[2]),
     )
     shares = _shares(stage.held_out, floor)
     findings = [
@@ -273,7 +220,7 @@ def _outcome(
         for (c, effect, quantities), share in zip(named, shares, strict=True)
     ]
     warnings = stage.experiment.warnings(stage.likelihood, origin.likelihood)
-    left = stage.experiment.left(stage.likelihood, _predicted(stage.likelihood, stage.fit))
+    left = stage.experiment.left(stage.likelihood, predicted(stage.likelihood, stage.fit))
     if refused is not None and not left:
         left = (
             f"something is left: the training data speak for {refused.cause} at {refused.location} (log evidence "
@@ -289,7 +236,7 @@ def _outcome(
         nominal,
         extended,
         tuple([left, *warnings] if left else warnings),
-        spectra=origin.experiment.shown(kept, predicted),
+        spectra=origin.experiment.shown(kept, shown),
     )
 
 

@@ -37,6 +37,11 @@ class Likelihood(Protocol):
     nuisance_mean: Array
     nuisance_width: Array
 
+    @property
+    def band_hz(self) -> tuple[float, float]:
+        """Lowest and highest frequency of the data [Hz]."""
+        ...
+
     def plant(self, theta: Array, causes: Sequence[Hypothesis] = ()) -> Plant:
         """The plant at parameters `theta` with causes in it."""
         ...

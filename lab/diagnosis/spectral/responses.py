@@ -75,6 +75,11 @@ class ResponseLikelihood:
     nuisance_mean: Array
     nuisance_width: Array
 
+    @property
+    def band_hz(self) -> tuple[float, float]:
+        """Lowest and highest frequency of the data [Hz]."""
+        return float(self.frequency_hz[0]), float(self.frequency_hz[-1])
+
     def plant(self, theta: Array, causes: Sequence[Hypothesis] = ()) -> Plant:
         """The plant at parameters `theta` with causes in it."""
         return explained(self.twin.changed(*self.parameters.factors(theta)), causes, self.survey)

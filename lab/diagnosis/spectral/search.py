@@ -12,9 +12,11 @@ from identification.recording import Array
 from lab.diagnosis.evidence import minus_two_log_evidence
 from lab.diagnosis.fit import POOL
 from lab.diagnosis.misfit import Hypothesis
-from lab.diagnosis.search import Candidate, hypotheses, wrong_parameters
+from lab.diagnosis.search import Candidate, hypotheses
+from lab.diagnosis.spectral.changes import changes
 from lab.diagnosis.spectral.fit import Point, SpectralFit, fit, point, slopes, system, whitened_error
 from lab.diagnosis.spectral.likelihood import Likelihood
+from lab.diagnosis.spectral.plausible import plausible
 from lab.effects.effect import Effect
 
 REFITTED, PER_CAUSE, POLISHED = 7, 2, 3
@@ -73,6 +75,7 @@ def search(
     effects: Mapping[str, type[Effect]],
     *,
     anchors: Sequence[SpectralFit] = (),
+    large: bool = True,
 ) -> tuple[list[Candidate], int]:
     """Candidates for one more cause beside those present, best first, and how many were looked at.
 
@@ -82,6 +85,7 @@ def search(
         effects: causes that may be named.
         anchors: other points with the same causes from which to look, such as the model as given: a calibration that took
             pains to explain a cause it does not have is a bad place to see it from.
+        large: whether to try changes of the model's own parameters that are far from where it has them.
     """
     taken = {(cause.kind, cause.location) for cause in present.causes}
     if any(cause.kind.cause == "attached_oscillator" for cause in present.causes):
@@ -92,15 +96,17 @@ def search(
     for anchor in anchors:
         picked += [(anchor, h) for h in _best(screen(likelihood, anchor, proposed))]
     without = _cost(present)
-    candidates = wrong_parameters(likelihood, present, without, effects)  # type: ignore[arg-type]
-    looks = len(proposed) + len(candidates)
+    candidates, looks = changes(likelihood, present, effects, starts=[present, *anchors] if large else [])
     rough = [refitted(likelihood, anchor, h, iterations=6, tolerance=3.0) for anchor, h in picked]
     scored = sorted((candidate(f, without) for f in rough if f is not None), key=lambda c: -c.gain)
     for old in [c for c in scored[:POLISHED] if c.gain > HOPELESS]:
         f = fit(likelihood, old.fit.theta, old.fit.causes, old.fit.nuisance)  # type: ignore[attr-defined]
         candidates.append(max(old, candidate(f, without), key=lambda c: c.gain))
     candidates += [c for k, c in enumerate(scored) if k >= POLISHED or c.gain <= HOPELESS]
-    return _once(sorted(candidates, key=lambda c: -c.gain)), looks
+    named = [
+        c for c in candidates if c.direction is not None or plausible(c.fit.causes[-1], likelihood.band_hz)
+    ]
+    return _once(sorted(named, key=lambda c: -c.gain)), len(proposed) + looks
 
 
 def drifting(parts: Likelihood, present: SpectralFit, kind: type[Effect]) -> tuple[list[Candidate], int]:

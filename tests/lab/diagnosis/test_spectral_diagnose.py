@@ -85,10 +85,10 @@ def test_a_cause_hidden_in_a_chain_is_named(seven, cause, location, size):
         assert abs(found.value - value) < 4 * found.std
 
 
-def responses(rig, noise, seed):
+def responses(rig, noise, seed, dt=0.02):
     """Responses of the rig's twin on 400 lines, with complex white noise relative to their RMS."""
     rng = np.random.default_rng(seed)
-    f, dt = 0.05 * np.arange(1, 401), 0.02
+    f = 0.05 * np.arange(1, 401)
     H = plant_response(twin(rig).plant, f, dt=dt)
     level = noise * np.sqrt(np.mean(np.abs(H) ** 2, axis=0))
     H = H + level * (rng.standard_normal(H.shape) + 1j * rng.standard_normal(H.shape)) / np.sqrt(2)
