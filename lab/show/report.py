@@ -11,7 +11,7 @@ from identification.recording import Recording
 from lab.result import Result
 from lab.show.figures import draw, matrix_maps
 from lab.show.page import checksums, inline, surroundings, template
-from lab.show.signals import measured_inputs
+from lab.show.recorded import recorded
 from lab.show.tables import (
     MAX_PRINTED,
     criteria_rows,
@@ -67,14 +67,8 @@ def write_report(
 
 
 def _about(result: Result, recording: Recording) -> str:
-    realization, n = result.realization, len(recording.records)
-    kinds = ", ".join(sorted({record.kind.replace("_", " ") for record in recording.records}))
-    return (
-        f"Identified by {realization.method}, order {realization.order}, "
-        f"from {n} record{'s' if n > 1 else ''} ({kinds}) "
-        f"with {len(measured_inputs(recording))} inputs and {len(recording.outputs)} outputs, "
-        f"{recording.duration:g} s at {recording.sample_rate:g} Hz."
-    )
+    realization = result.realization
+    return f"Identified by {realization.method}, order {realization.order}, from {recorded(recording)}."
 
 
 def _compared(result: Result) -> str:

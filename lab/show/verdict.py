@@ -58,7 +58,7 @@ def verdict(result: Result) -> Verdict:
     if missed:
         reasons = "; ".join(_shortfall(criterion) for criterion in missed)
         return Verdict(
-            FAILED, f"Failed: {len(missed)} of {_count(n, 'criterion', 'criteria')} missed: {reasons}."
+            FAILED, f"Failed: {len(missed)} of {counted(n, 'criterion', 'criteria')} missed: {reasons}."
         )
     met = {1: "the criterion is met", 2: "both criteria are met"}.get(n, f"all {n} criteria are met")
     return Verdict(PASSED, f"Passed: {met}. {_found(result)}")
@@ -108,7 +108,7 @@ def _found(result: Result) -> str:
             if result.stabilization is None or stable == len(modes)
             else f", {stable} of them stable over the model orders"
         )
-        return f"{_count(len(modes), 'mode was', 'modes were')} found {span}{how}."
+        return f"{counted(len(modes), 'mode was', 'modes were')} found {span}{how}."
     n_true = len(comparison.pairs) + len(comparison.missed)
     parts = []
     if comparison.pairs:
@@ -119,18 +119,18 @@ def _found(result: Result) -> str:
         worst_mac = min(pair.mac for pair in comparison.pairs)
         agreement = "1" if lowered(worst_mac) == "1" else f"at least {lowered(worst_mac)}"
         parts.append(
-            f"{len(comparison.pairs)} of {_count(n_true, 'true mode', 'true modes')} found, "
+            f"{len(comparison.pairs)} of {counted(n_true, 'true mode')} found, "
             f"frequencies within {percent(worst_frequency)}, {damping_part}MAC {agreement}"
         )
     else:
-        parts.append(f"none of {_count(n_true, 'true mode', 'true modes')} was found")
+        parts.append(f"none of {counted(n_true, 'true mode')} was found")
     errors = {"M": comparison.mass_error, "C": comparison.damping_error, "K": comparison.stiffness_error}
     known = {name: error for name, error in errors.items() if error is not None}
     if known:
         parts.append(f"{', '.join(known)} recovered within {max(known.values()):.1e} of the largest entry")
     sentence = "; ".join(parts)
     if comparison.extra:
-        sentence += f"; {_count(len(comparison.extra), 'mode', 'modes')} found that the model does not have"
+        sentence += f"; {counted(len(comparison.extra), 'mode')} found that the model does not have"
     return sentence[0].upper() + sentence[1:] + "."
 
 
@@ -177,5 +177,6 @@ def lowered(mac: float) -> str:
     return f"{math.floor(mac * 10**decimals) / 10**decimals:.{decimals}f}"
 
 
-def _count(n: int, one: str, many: str) -> str:
-    return f"{n} {one if n == 1 else many}"
+def counted(n: int, one: str, many: str = "") -> str:
+    """A number of things in words; the plural has an s unless it is given."""
+    return f"{n} {one if n == 1 else many or one + 's'}"

@@ -264,7 +264,7 @@ def test_frequency_responses_are_diagnosed_from_files(tmp_path, monkeypatch, cap
     # Four standard deviations: one chance in ten thousand.
     assert abs(mass["value"] - 0.1) < 4 * mass["std"] < 0.05
     page = Path("out/report.html").read_text("utf-8")
-    assert "the frequency responses of 3 outputs to 1 inputs, 400 lines from 0.05 to 20 Hz" in page
+    assert "the frequency responses of 3 outputs to 1 input, 400 lines from 0.05 to 20 Hz" in page
     assert sorted(os.listdir("out")) == OUTPUTS
     save(renamed(recorded(two_masses(), n_records=1), {"pos1": "tip"}), "samples.h5")
     assert "holds samples and the recording frequency responses; expected both alike" in complaint(
