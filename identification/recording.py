@@ -237,8 +237,8 @@ class Recording:
         Raises:
             RecordingError: a name is not among the channels.
         """
-        rows_in, channels_in = _rows(self.inputs, inputs, "input")
-        rows_out, channels_out = _rows(self.outputs, outputs, "output")
+        rows_in, channels_in = named_rows(self.inputs, inputs, "input")
+        rows_out, channels_out = named_rows(self.outputs, outputs, "output")
         records = tuple(
             replace(
                 record,
@@ -305,9 +305,22 @@ class Recording:
         )
 
 
-def _rows(
+def named_rows(
     channels: Sequence[Channel], names: Iterable[str] | None, side: str
 ) -> tuple[list[int], tuple[Channel, ...]]:
+    """Positions of the named channels, and the channels, in the order of the names (all when None).
+
+    Args:
+        channels: those that there are.
+        names: those asked for.
+        side: "input" or "output", for the message.
+
+    Returns:
+        Positions, and channels.
+
+    Raises:
+        RecordingError: a name is not among the channels.
+    """
     if names is None:
         return list(range(len(channels))), tuple(channels)
     position = {channel.name: row for row, channel in enumerate(channels)}

@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
 from identification.errors import IdentificationError
-from identification.recording import Array, Channel, frozen
+from identification.recording import Array, Channel, frozen, named_rows
 
 Complex = NDArray[np.complex128]
 
@@ -88,6 +89,25 @@ class FrequencyResponse:
             coherence=coherence,
             variance=variance,
             weight=weight,
+        )
+
+    def select(
+        self, *, inputs: Sequence[str] | None = None, outputs: Sequence[str] | None = None
+    ) -> FrequencyResponse:
+        """The responses of the named outputs to the named inputs, in the order given (all when None).
+
+        Raises:
+            RecordingError: a name is not among the channels.
+        """
+        columns, channels_in = named_rows(self.inputs, inputs, "input")
+        rows, channels_out = named_rows(self.outputs, outputs, "output")
+        return replace(
+            self,
+            values=self.values[:, rows][:, :, columns],
+            inputs=channels_in,
+            outputs=channels_out,
+            coherence=None if self.coherence is None else self.coherence[:, rows],
+            variance=None if self.variance is None else self.variance[:, rows][:, :, columns],
         )
 
     def __repr__(self) -> str:

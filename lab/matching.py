@@ -119,25 +119,7 @@ def same_channels(
         _require(wanted, getattr(baseline, side), "the baseline", f"{side[:-1]} channel")
     inputs = [channel.name for channel in recording.inputs]
     outputs = [channel.name for channel in recording.outputs]
-    if isinstance(baseline, FrequencyResponse):
-        return _responses(baseline, inputs, outputs)
     return baseline.select(inputs=inputs, outputs=outputs)
-
-
-def _responses(response: FrequencyResponse, inputs: list[str], outputs: list[str]) -> FrequencyResponse:
-    """The responses of these outputs to these inputs."""
-    columns, rows = (
-        [[channel.name for channel in known].index(name) for name in wanted]
-        for known, wanted in ((response.inputs, inputs), (response.outputs, outputs))
-    )
-    return replace(
-        response,
-        values=response.values[:, rows][:, :, columns],
-        inputs=tuple(response.inputs[k] for k in columns),
-        outputs=tuple(response.outputs[k] for k in rows),
-        coherence=None if response.coherence is None else response.coherence[:, rows],
-        variance=None if response.variance is None else response.variance[:, rows][:, :, columns],
-    )
 
 
 def _flat(table: Mapping[str, Any], path: Path, inside: str = "") -> dict[str, str]:

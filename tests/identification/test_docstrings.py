@@ -12,7 +12,7 @@ FOLDER = Path(identification.__file__).parent
 
 CHOICES = """
 all_lines around_the_order brief_warnings choose_method choose_orders choose_segments default_degree explanation
-family find_method find_peaks find_period first_settled gathered hankel_size leading_subspace matrix_model
+family find_method find_peaks find_period first_settled gathered hankel_size leading_subspace matrix_model named_rows
 numerical_rank orders_within_rank output_error plan_hankel planned predict repeat require_channels resonance_band
 response_rank settle_orders shows_rank simulated start_values told_shift values_near
 """
