@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from identification.recording import Array
 from identification.systems import SecondOrder
 from lab.result import Result
-from lab.show.shapes import dof_shapes
+from lab.shapes import dof_shapes
 
 
 @dataclass(frozen=True, eq=False)

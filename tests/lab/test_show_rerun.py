@@ -13,11 +13,11 @@ from rerun.chunk import RrdReader
 
 from identification.recording import Channel, Record, Recording
 from lab.rig import Rig
+from lab.shapes import dof_shapes
 from lab.show import structure
 from lab.show.rerun_log import write_rrd
 from lab.show.rerun_log.matrices import scaled
 from lab.show.rerun_log.spectra import level_range
-from lab.show.shapes import dof_shapes
 from lab.show.signals import spectra, upper_frequency
 from tests.lab.showcase import RATE, chain_result, chain_rig, motion_of, pulse_recording, random_recording
 from tests.lab.test_show_structure import MIXED

@@ -9,11 +9,10 @@ from lab.diagnosis.outcome import Diagnosis
 from lab.show.drawing import SERIES
 from lab.show.figures.canvas import Drawing, drawing, plain
 from lab.show.findings import evidence, ranked_causes
+from lab.validation import COVERAGE
 
 DECISIVE = 5.0
 """Evidence beyond which a cause is hardly chance: 150 to 1."""
-COVERAGE = 2.0
-"""Standard deviations on each side of an error bar."""
 
 
 def causes_figure(diagnosis: Diagnosis) -> Drawing | None:

@@ -10,9 +10,7 @@ from matplotlib.ticker import MaxNLocator
 from lab.result import Result
 from lab.show.drawing import SERIES
 from lab.show.figures.canvas import Drawing, drawing, few_ticks
-
-COVERAGE = 2.0
-"""Standard deviations on each side."""
+from lab.validation import COVERAGE
 
 
 def error_bars(result: Result) -> Drawing | None:

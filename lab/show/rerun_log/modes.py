@@ -9,11 +9,12 @@ import rerun as rr
 import rerun.blueprint as rrb
 
 from lab.result import Result
+from lab.shapes import aligned, displacement_shapes, dof_shapes
 from lab.show import structure
 from lab.show.drawing import SERIES, Axes, rgb
 from lab.show.rerun_log.plot import AXIS, log_axes, plain, plot_view
 from lab.show.rerun_log.scene import TIMELINE, log_frames, log_solids, view
-from lab.show.shapes import aligned, displacement_shapes, dof_shapes, shown_modes
+from lab.show.shapes import shown_modes
 
 if TYPE_CHECKING:
     from lab.rig import Rig
