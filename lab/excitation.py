@@ -2,9 +2,7 @@
 
 from __future__ import annotations
 
-import itertools
-import math
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, fields
 from typing import ClassVar
 
@@ -14,59 +12,8 @@ import scipy.signal
 
 from identification.recording import Array
 from lab.errors import LabError, UnknownNameError
+from lab.loads import BLOCK, BandNoise, Blocks, Load, Sampling, band_within
 from lab.rig import Rig
-
-BLOCK = 4096
-"""Samples per block of a load; fixed, so that no result depends on how a simulation cuts its work."""
-
-FILTER_ORDER = 6
-"""Order of the Butterworth filter at each edge of a band."""
-
-Blocks = Iterator[tuple[Array, Array | None]]
-
-
-@dataclass(frozen=True, eq=False)
-class Load:
-    """What one record applies to the structure.
-
-    Attributes:
-        kind: record kind of the recording file.
-        n_samples: length.
-        blocks: starts an iterator over commanded inputs (n_inputs, m) and unmeasured forces on the degrees of freedom
-            (n_dofs, m), or None when there are none; the same values every time.
-        position: displacement from the operating point at the start, shape (n_dofs,) [m or rad].
-        velocity: shape (n_dofs,) [m/s or rad/s].
-        measured: whether the inputs are recorded.
-        number: of the record in its recording.
-        whole: samples of the whole record, where this is only its start; 0 where it is all of it.
-    """
-
-    kind: str
-    n_samples: int
-    blocks: Callable[[], Blocks]
-    position: Array
-    velocity: Array
-    measured: bool = True
-    number: int = 0
-    whole: int = 0
-
-    @property
-    def n_record(self) -> int:
-        """Samples of the whole record."""
-        return self.whole or self.n_samples
-
-
-@dataclass(frozen=True)
-class Sampling:
-    """Rate [Hz] and length of every record."""
-
-    sample_rate: float
-    n_samples: int
-
-    @property
-    def time(self) -> Array:
-        """Instants of the samples [s]."""
-        return np.arange(self.n_samples) / self.sample_rate
 
 
 @dataclass(frozen=True)
@@ -131,7 +78,7 @@ class Sweep(Excitation):
 
     def loads(self, rig: Rig, sampling: Sampling, rng: np.random.Generator) -> list[Load]:
         _require(self)
-        low, high = _band(self.band, sampling)
+        low, high = band_within(self.band, sampling)
         if self.law not in ("linear", "logarithmic"):
             raise LabError(f"sweep law is {self.law!r}; expected 'linear' or 'logarithmic'")
         if self.law == "logarithmic" and low <= 0:
@@ -153,7 +100,7 @@ class Random(Excitation):
 
     def loads(self, rig: Rig, sampling: Sampling, rng: np.random.Generator) -> list[Load]:
         _require(self, from_zero=("rms",))
-        noise = _Noise(len(rig.inputs), self.rms, self.band, sampling, _seed(rng))
+        noise = BandNoise(len(rig.inputs), self.rms, self.band, sampling, _seed(rng))
         return [_load(self.kind, rig, sampling, lambda: ((block, None) for block in noise.blocks()))]
 
 
@@ -170,7 +117,7 @@ class BurstRandom(Excitation):
         _require(self, from_zero=("rms", "burst"))
         if self.burst > 1:
             raise LabError(f"burst is {self.burst}; expected a share of the record, from 0 to 1")
-        noise = _Noise(len(rig.inputs), self.rms, self.band, sampling, _seed(rng))
+        noise = BandNoise(len(rig.inputs), self.rms, self.band, sampling, _seed(rng))
         last = round(self.burst * sampling.n_samples)
 
         def blocks() -> Blocks:
@@ -196,7 +143,7 @@ class Multisine(Excitation):
 
     def loads(self, rig: Rig, sampling: Sampling, rng: np.random.Generator) -> list[Load]:
         _require(self, above_zero=("period",), from_zero=("rms",))
-        low, high = _band(self.band, sampling)
+        low, high = band_within(self.band, sampling)
         n = sampling.n_samples if self.period is None else self._period_samples(sampling)
         number = np.arange(n // 2 + 1)
         lines, near = number * sampling.sample_rate / n, 1e-9 * sampling.sample_rate / n
@@ -243,7 +190,7 @@ class Ambient(Excitation):
             raise LabError(
                 f"ambient dofs are {self.dofs}; expected at least one degree of freedom, each once"
             )
-        noise = _Noise(len(rows), self.rms, self.band, sampling, _seed(rng))
+        noise = BandNoise(len(rows), self.rms, self.band, sampling, _seed(rng))
 
         def blocks() -> Blocks:
             for block in noise.blocks():
@@ -288,70 +235,6 @@ EXCITATIONS: dict[str, type[Excitation]] = {
     excitation.kind: excitation
     for excitation in (Pulse, Impact, Random, BurstRandom, Sweep, Multisine, Ambient, FreeDecay)
 }
-
-
-@dataclass(frozen=True)
-class _Noise:
-    """Gaussian noise of a given RMS on several rows, white or band-limited, the same for every start."""
-
-    n_rows: int
-    rms: float
-    band: tuple[float, float] | None
-    sampling: Sampling
-    seed: int
-
-    def __post_init__(self) -> None:
-        _band(self.band or (0.0, 0.0), self.sampling)
-
-    def blocks(self) -> Iterator[Array]:
-        rng = np.random.default_rng(self.seed)
-        sections, scale = self._filter()
-        memory = (
-            np.zeros((0, self.n_rows, 2)) if sections is None else np.zeros((len(sections), self.n_rows, 2))
-        )
-        for first in range(0, self.sampling.n_samples, BLOCK):
-            n = min(BLOCK, self.sampling.n_samples - first)
-            # Drawn sample by sample across the rows, so that a shorter record is the start of a longer one.
-            block = rng.standard_normal((n, self.n_rows)).T
-            if sections is not None:
-                block, memory = scipy.signal.sosfilt(sections, block, axis=1, zi=memory)
-            yield self.rms * scale * block
-
-    def _filter(self) -> tuple[Array | None, float]:
-        if self.band is None:
-            return None, 1.0
-        low, high = _band(self.band, self.sampling)
-        nyquist = self.sampling.sample_rate / 2
-        if low <= 0 and high >= nyquist:
-            return None, 1.0
-        edges = [edge / nyquist for edge in (low, high) if 0 < edge < nyquist]
-        kind = "bandpass" if len(edges) == 2 else "lowpass" if low <= 0 else "highpass"
-        sections = scipy.signal.butter(
-            FILTER_ORDER, edges if len(edges) == 2 else edges[0], kind, output="sos"
-        )
-        # White noise of unit variance leaves with the energy of the impulse response, by Parseval's theorem.
-        return sections, 1 / math.sqrt(_energy(edges, kind))
-
-
-def _energy(edges: Sequence[float], kind: str) -> float:
-    """Mean power gain of the digital Butterworth filter over all frequencies, as shares of half the sample rate."""
-    corners = [math.tan(math.pi * edge / 2) for edge in edges]
-
-    def gain(share: float) -> float:
-        w = math.tan(math.pi * share / 2)
-        if kind == "bandpass":
-            x = (w * w - corners[0] * corners[1]) / ((corners[1] - corners[0]) * w)
-        else:
-            x = w / corners[0] if kind == "lowpass" else corners[0] / w
-        return 1 / (1 + x ** (2 * FILTER_ORDER))
-
-    # Closer and closer to the edges, so that no narrow band is overlooked.
-    width = edges[1] - edges[0] if kind == "bandpass" else min(edges[0], 1 - edges[0])
-    near = [edge + side * width * 4.0**k for edge in edges for side in (-1, 0, 1) for k in range(-1, 20)]
-    points = [0.0, *sorted({point for point in near if 0 < point < 1}), 1.0]
-    return sum(
-        scipy.integrate.quad(gain, a, b, epsabs=0, epsrel=1e-10)[0] for a, b in itertools.pairwise(points)
-    )
 
 
 def _require(
@@ -403,18 +286,6 @@ def _one_by_one(kind: str, rig: Rig, shape: Array) -> list[Load]:
 
     sampling = Sampling(1.0, shape.size)
     return [_load(kind, rig, sampling, on(row)) for row in range(max(len(rig.inputs), 1))]
-
-
-def _band(band: Sequence[float], sampling: Sampling) -> tuple[float, float]:
-    low, high = band
-    nyquist = sampling.sample_rate / 2
-    if (low, high) == (0.0, 0.0):
-        return 0.0, nyquist
-    if not 0 <= low < high <= nyquist:
-        raise LabError(
-            f"band is {low} to {high} Hz; expected 0 <= low < high <= {nyquist} Hz, half the sample rate"
-        )
-    return float(low), float(high)
 
 
 def _dof(rig: Rig, name: str) -> int:

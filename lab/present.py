@@ -8,9 +8,10 @@ from pathlib import Path
 import numpy as np
 
 from identification.recording import Recording
-from lab.excitation import Excitation, Load, Sampling
+from lab.excitation import Excitation
 from lab.files.checksum import sha256_of
 from lab.files.results import save_result
+from lab.loads import Load, Sampling
 from lab.result import Result
 from lab.rig import Rig
 from lab.scenario import Scenario

@@ -10,7 +10,8 @@ import numpy as np
 
 from identification.recording import Array, Recording
 from lab.errors import LabError
-from lab.excitation import BLOCK, Blocks, Excitation, Load, Sampling
+from lab.excitation import Excitation
+from lab.loads import BLOCK, Blocks, Load, Sampling
 from lab.rig import Rig
 from lab.simulate import simulate
 from lab.stepping import highest_frequency

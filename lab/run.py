@@ -15,10 +15,10 @@ from identification.recording import Recording
 from lab.compare import compare
 from lab.criteria import judge
 from lab.errors import RigError
-from lab.excitation import Sampling
 from lab.files.folder import output_folder
 from lab.files.recording import load
 from lab.instruments import instrument
+from lab.loads import Sampling
 from lab.present import present
 from lab.result import Result
 from lab.rig import Rig

@@ -13,8 +13,9 @@ import numpy as np
 from identification.recording import Array, Record, Recording
 from lab import stepping
 from lab.errors import LabError
-from lab.excitation import BLOCK, Excitation, Load, Sampling
+from lab.excitation import Excitation
 from lab.files.recording import RecordingWriter, load
+from lab.loads import BLOCK, Load, Sampling
 from lab.response import Part, Response, fresh_sensors, sensed, through
 from lab.rig import Rig
 from lab.stages import Process

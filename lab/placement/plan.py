@@ -9,7 +9,8 @@ import numpy as np
 
 from identification.recording import Array, Channel
 from lab.errors import LabError
-from lab.excitation import EXCITATIONS, Excitation, Sampling
+from lab.excitation import EXCITATIONS, Excitation
+from lab.loads import Sampling
 from lab.rig import Rig
 
 SAMPLES_PER_PERIOD, PERIODS = 8, 100

@@ -6,10 +6,8 @@ import numpy as np
 import pytest
 import scipy.signal
 
-from lab import excitation
 from lab.errors import LabError, UnknownNameError
 from lab.excitation import (
-    BLOCK,
     EXCITATIONS,
     Ambient,
     BurstRandom,
@@ -18,9 +16,9 @@ from lab.excitation import (
     Multisine,
     Pulse,
     Random,
-    Sampling,
     Sweep,
 )
+from lab.loads import BLOCK, BandNoise, Sampling
 from lab.rig import Rig
 from tests.lab.structures import model, oscillator
 
@@ -82,7 +80,8 @@ def test_a_seed_fixes_everything(kind):
 def test_size_of_blocks_does_not_matter(kind, block, monkeypatch):
     sampling = Sampling(100.0, 2000 if block == 1 else 10_000)
     whole = [signals(load) for load in loads(EXAMPLES[kind], sampling=sampling)]
-    monkeypatch.setattr(excitation, "BLOCK", block)
+    for module in ("excitation", "loads"):
+        monkeypatch.setattr(f"lab.{module}.BLOCK", block)
     assert block != BLOCK
     for load, (inputs, forces) in zip(loads(EXAMPLES[kind], sampling=sampling), whole, strict=True):
         again, forces_again = signals(load)
@@ -189,7 +188,7 @@ def test_band_limited_noise_keeps_to_its_band(kind, band):
 )
 def test_band_limited_noise_is_scaled_by_the_energy_of_its_filter(band, fs):
     """Twin: the impulse response, summed until it has died down."""
-    noise = excitation._Noise(1, 1.0, band, Sampling(fs, 10), 0)
+    noise = BandNoise(1, 1.0, band, Sampling(fs, 10), 0)
     sections, scale = noise._filter()
     n = int(60 * fs / (band[1] - band[0]))
     impulse = np.zeros(n)

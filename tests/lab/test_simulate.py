@@ -16,8 +16,9 @@ from identification.systems import SecondOrder
 from lab import excitation, stepping
 from lab.chain import Chain
 from lab.errors import DivergedError, FileError, LabError
-from lab.excitation import Ambient, FreeDecay, Impact, Pulse, Random, Sampling
+from lab.excitation import Ambient, FreeDecay, Impact, Pulse, Random
 from lab.files.recording import load
+from lab.loads import Sampling
 from lab.rig import Rig
 from lab.simulate import DRIVE, motion, simulate_to_file
 from lab.stages import Delay, Dropout, Gain, Hum, Lag, LowPass, Noise, Resolution, Saturation
