@@ -33,8 +33,8 @@ from lab.twin import Twin
 
 TRAIN = 0.7
 """Share of every record, from its start, that fits may see."""
-PARTS = 4
-"""Parts of a record that are compared to see a spring drift."""
+PARTS = (4, 2)
+"""Parts of a record that are compared to see a spring drift, those that are tried first."""
 LINES = 100.0
 """Lines averaged for one held-out error, per channel."""
 VISIBLE = (
@@ -132,20 +132,34 @@ class Recorded:
 
     def again(self, likelihood: Ambient) -> Ambient:
         """The likelihood of the training samples as they are now, with tones taken out."""
-        return likelihood.with_data(self._stretches(likelihood, len(likelihood.data)), likelihood.shares)
+        first = likelihood.data[0].bands
+        low = (first.first[0] - 0.5) / (first.length * first.dt)
+        return likelihood.with_data(self._stretches(likelihood, len(likelihood.data), low), likelihood.shares)
 
     def in_parts(self, likelihood: Ambient) -> Ambient | None:
-        """The likelihood of consecutive parts of the records; None where they are too short to see a resonance each."""
-        parts = [y[:, k] for y in self.training for k in [slice(0, y.shape[1] // PARTS)]]
+        """The likelihood of consecutive parts of the records, at the frequencies whose resonances they resolve.
+
+        None where they are too short for most of them. Two parts resolve more than four, and tell three quarters of what
+        the record tells about a change along it.
+        """
+        for parts in PARTS:
+            low = self._resolved_from(likelihood, parts)
+            if low is not None:
+                shares = [self.share * (k + 0.5) / parts for k in range(parts)]
+                return likelihood.with_data(self._stretches(likelihood, parts, low), shares)
+        return None
+
+    def _resolved_from(self, likelihood: Ambient, parts: int) -> float | None:
+        """Frequency above which parts resolve all resonances [Hz]; None where that is less than half of all lines."""
         try:
-            length = piece_length(parts)
+            length = piece_length([y[:, : y.shape[1] // parts] for y in self.training])
         except LabError:
             return None
         f = likelihood.data[0].bands.frequency_hz
-        if np.min(half_bandwidth(likelihood.twin.plant, f)) * length * self.dt < 1:
-            return None
-        shares = [self.share * (k + 0.5) / PARTS for k in range(PARTS)]
-        return likelihood.with_data(self._stretches(likelihood, PARTS), shares)
+        blurred = f[half_bandwidth(likelihood.twin.plant, f) * length * self.dt < 1]
+        if not blurred.size:
+            return 0.0
+        return float(blurred[-1]) if blurred[-1] < 0.5 * (f[0] + f[-1]) else None
 
     def held_out(self, likelihood: Ambient) -> Ambient:
         """The likelihood of samples that no fit has seen."""
@@ -223,13 +237,14 @@ class Recorded:
             )
         return said
 
-    def _stretches(self, likelihood: Ambient, parts: int) -> list[Averages]:
+    def _stretches(self, likelihood: Ambient, parts: int, low: float) -> list[Averages]:
         cut = [
             [y[:, k * y.shape[1] // parts : (k + 1) * y.shape[1] // parts] for y in self.training]
             for k in range(parts)
         ]
         length = piece_length([y for part in cut for y in part])
-        bands = bands_for(likelihood.twin.plant, length, self.dt, band=self.band)
+        lowest, highest = self.band or (0.0, np.inf)
+        bands = bands_for(likelihood.twin.plant, length, self.dt, band=(max(low, lowest), highest))
         return [self._averages(part, bands) for part in cut]
 
     def _averages(self, outputs: list[Array], bands: Bands) -> Averages:

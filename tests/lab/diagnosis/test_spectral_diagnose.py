@@ -5,9 +5,13 @@ import pytest
 
 from identification.recording import Record, Recording
 from identification.response import FrequencyResponse
+from lab.diagnosis.calibrate import parameters_of
 from lab.diagnosis.diagnose import diagnose
 from lab.diagnosis.outcome import CONSISTENT, EXPLAINED
-from lab.diagnosis.spectral.diagnose import diagnose_spectra
+from lab.diagnosis.spectral.diagnose import diagnose_spectra, evidence_threshold
+from lab.diagnosis.spectral.fit import fit
+from lab.diagnosis.spectral.recorded import Recorded
+from lab.diagnosis.spectral.search import drifting
 from lab.diagnosis.spectral.transfer import plant_response
 from lab.effects import EFFECTS
 from lab.errors import LabError
@@ -121,3 +125,34 @@ def test_dead_and_broken_channels_are_refused(three):
     )
     with pytest.raises(LabError, match="no stretch of 64 samples"):
         diagnose_spectra(holes, three)
+
+
+@pytest.mark.slow
+def test_parts_of_a_record_show_a_spring_that_drifts_although_they_blur_the_lowest_mode(seven):
+    drift = EFFECTS["stiffness_drift"]("spring2_3", relative_change_over_record=-0.4)
+    model = twin(seven)
+    experiment = Recorded.of(measured(drift.apply(seven), 50.0, 4000, 3), seven, model, band=None)
+    likelihood = experiment.likelihood(model, parameters_of(model), seven)
+    found = fit(likelihood, np.zeros(likelihood.parameters.n), (), likelihood.nuisance_mean)
+    parts = experiment.in_parts(experiment.surveyed(likelihood, found.nuisance))
+    assert len(parts.data) == 4
+    # Each lasts 14 s, and half the bandwidth of the lowest mode is a hundredth of a hertz.
+    lowest = seven.second_order().modes().frequency_hz[0]
+    assert lowest < parts.band_hz[0] < 5
+    (best, *_), places = drifting(parts, found, EFFECTS["stiffness_drift"])
+    assert (best.location, places) == ("spring2_3", 7)
+    assert best.gain > evidence_threshold(100)
+    value, std = best.fit.causes[-1].values[0], np.sqrt(best.fit.covariance[21, 21])
+    # Four standard deviations: one chance in ten thousand.
+    assert abs(value + 0.4) < 4 * std
+
+
+@pytest.mark.parametrize(("n", "parts"), [(300, 2), (150, None)])
+def test_short_records_have_fewer_parts_or_none(seven, n, parts):
+    model = twin(seven)
+    experiment = Recorded.of(measured(seven, 50.0, n, 3), seven, model, band=None)
+    found = experiment.in_parts(experiment.likelihood(model, parameters_of(model), seven))
+    assert (found and len(found.data)) == parts
+    if found:
+        # What a tone taken out changes, it changes at the same lines.
+        assert experiment.again(found).band_hz == found.band_hz
