@@ -22,7 +22,7 @@ MAX_PARAMETERS = 700
 ROUNDING = 1e11
 """Variance inflation above which rounding decides, so that the layout counts as blind."""
 
-Choice = tuple[tuple[int, ...], tuple[int, ...]]
+Layout = tuple[tuple[int, ...], tuple[int, ...]]
 """Sensors and actuators, as positions among the candidates."""
 
 MEASURES = {
@@ -64,15 +64,15 @@ class Contest:
         summed = np.stack([each[list(own)].sum(axis=0) for own in self.sensors.channels])
         return np.asarray(summed * self.units * self.units[:, None])
 
-    def possible(self, choice: Choice) -> bool:
+    def possible(self, layout: Layout) -> bool:
         """Whether every degree of freedom has a sensor or an actuator, and one has both."""
-        sensed, driven = self.held(choice)
+        sensed, driven = self.held(layout)
         return bool(np.all(sensed | driven) and np.any(sensed & driven))
 
-    def held(self, choice: Choice) -> tuple[np.ndarray, np.ndarray]:
+    def held(self, layout: Layout) -> tuple[np.ndarray, np.ndarray]:
         """Whether each degree of freedom has a sensor, and whether it has an actuator."""
-        read = {self.rig.outputs[i].dof for i in self.sensors.channels_of(choice[0])}
-        driven = {self.rig.inputs[i].dof for i in self.actuators.channels_of(choice[1])}
+        read = {self.rig.outputs[i].dof for i in self.sensors.channels_of(layout[0])}
+        driven = {self.rig.inputs[i].dof for i in self.actuators.channels_of(layout[1])}
         return tuple(np.array([dof in side for dof in self.rig.dofs]) for side in (read, driven))  # type: ignore[return-value]
 
 
@@ -151,9 +151,9 @@ def known_of(rig: Rig, plan: Plan) -> tuple[LayoutInformation, Array]:
     return known, np.repeat(largest, each)
 
 
-def possible_layouts(contest: Contest) -> list[Choice]:
+def possible_layouts(contest: Contest) -> list[Layout]:
     """Every layout that can recover M, C and K: a sensor or an actuator on every degree of freedom, one with both."""
-    found: list[Choice] = []
+    found: list[Layout] = []
     sets = [
         (chosen, contest.held((chosen, ()))[0])
         for chosen in subsets(len(contest.sensors), contest.n_sensors, contest.sensors.fixed)
@@ -166,10 +166,10 @@ def possible_layouts(contest: Contest) -> list[Choice]:
     return found
 
 
-def figures_of(contest: Contest, choices: Sequence[Choice]) -> Iterator[float]:
-    """The figure of each choice; those with the same actuators side by side share their work."""
+def figures_of(contest: Contest, layouts: Sequence[Layout]) -> Iterator[float]:
+    """The figure of each layout; those with the same actuators side by side share their work."""
     driving, each = None, np.zeros(())
-    for sensors, actuators in choices:
+    for sensors, actuators in layouts:
         if actuators != driving:
             driving, each = actuators, contest.by_sensor(actuators)
         yield figure(each[list(sensors)].sum(axis=0), contest.criterion)

@@ -11,11 +11,11 @@ from identification.recording import Array
 from lab.errors import LabError
 from lab.placement.arena import OFF, Arena, arena_of
 from lab.placement.candidates import Candidates, require_number
-from lab.placement.contest import Choice
+from lab.placement.contest import Layout
+from lab.placement.diagnosis_search import LIMIT, Compared, groups
 from lab.placement.outcome import CauseFigure, Drive, Placement, Ranked
 from lab.placement.plan import Plan, alternatives, peak, total_duration
 from lab.placement.search import count
-from lab.placement.teams import LIMIT, Teams, groups
 from lab.rig import Rig
 
 MEASURE = "mean over all causes of the probability of naming the likeliest wrong one"
@@ -60,19 +60,19 @@ def place_diagnosis(
     )
     actuators = replace(actuators, channels=tuple((i,) for i in range(len(actuators))))
     everything = arena_of(rig, plan, size, causes, n_acting=n_actuators)
-    teams = Teams(rig, plan, everything, sensors, actuators, n_sensors, n_actuators, limit)
-    teams.compare()
-    chosen, acting = teams.best
-    values = np.sort(np.array(list(teams.figures.values()))) if teams.proven else np.zeros(0)
-    layouts = [("best", teams.best, teams.arena)]
+    compared = Compared(rig, plan, everything, sensors, actuators, n_sensors, n_actuators, limit)
+    compared.search()
+    chosen, acting = compared.best
+    values = np.sort(np.array(list(compared.figures.values()))) if compared.proven else np.zeros(0)
+    layouts = [("best", compared.best, compared.arena)]
     if planned is not None:
         own = everything.under(rig, plan, actuators.channels_of(planned[1]))
         layouts.append(("planned", (tuple(planned[0]), tuple(planned[1])), own))
     if values.size > 1:
-        last = max(teams.figures, key=lambda choice: teams.figures[choice])
+        last = max(compared.figures, key=lambda layout: compared.figures[layout])
         layouts.append(("worst", last, everything.under(rig, plan, actuators.channels_of(last[1]))))
-    layouts.append(("all sensors", (tuple(range(len(sensors))), acting), teams.arena))
-    ranking = [_ranked(name, choice, arena, sensors, actuators, values) for name, choice, arena in layouts]
+    layouts.append(("all sensors", (tuple(range(len(sensors))), acting), compared.arena))
+    ranking = [_ranked(name, layout, arena, sensors, actuators, values) for name, layout, arena in layouts]
     channels = sensors.channels_of(chosen)
     return Placement(
         "diagnosis",
@@ -82,29 +82,29 @@ def place_diagnosis(
         sensors.named(chosen),
         actuators.named(acting),
         ranking[0].figure,
-        teams.proven,
-        ranking[0].figure if teams.proven else None,
-        teams.n_layouts,
-        teams.n_layouts,
+        compared.proven,
+        ranking[0].figure if compared.proven else None,
+        compared.n_layouts,
+        compared.n_layouts,
         values,
         tuple(ranking),
-        drives=tuple(_drives(teams, channels)),
-        causes=tuple(_told(teams.arena, channels)),
-        inseparable=tuple(_named(everything, group) for group in groups(teams.inseparable())),
-        warnings=tuple(_warnings(teams, size)),
+        drives=tuple(_drives(compared, channels)),
+        causes=tuple(_told(compared.arena, channels)),
+        inseparable=tuple(_named(everything, group) for group in groups(compared.inseparable())),
+        warnings=tuple(_warnings(compared, size)),
     )
 
 
 def _ranked(
-    name: str, choice: Choice, arena: Arena, sensors: Candidates, actuators: Candidates, values: Array
+    name: str, layout: Layout, arena: Arena, sensors: Candidates, actuators: Candidates, values: Array
 ) -> Ranked:
     """A layout with its figure, and the mean probability of naming any wrong cause."""
-    channels = sensors.channels_of(choice[0])
+    channels = sensors.channels_of(layout[0])
     value = arena.figure(channels)
     there = values.size and name != "all sensors"
     rank = int(np.sum(values < value * (1 - 1e-9))) + 1 if there else None
     details = {"any": float(np.nanmean(arena.mistakes(channels)))}
-    return Ranked(name, sensors.named(choice[0]), actuators.named(choice[1]), value, rank, details)
+    return Ranked(name, sensors.named(layout[0]), actuators.named(layout[1]), value, rank, details)
 
 
 def _told(arena: Arena, channels: Sequence[int]) -> Iterator[CauseFigure]:
@@ -122,30 +122,30 @@ def _named(arena: Arena, group: Sequence[int]) -> tuple[str, ...]:
     return tuple(" at ".join(arena.keys[i]) for i in group)
 
 
-def _drives(teams: Teams, channels: Sequence[int]) -> Iterator[Drive]:
+def _drives(compared: Compared, channels: Sequence[int]) -> Iterator[Drive]:
     """Other signals, and other levels of the planned one; causes of the same physical size, noise as planned."""
-    rig, plan, acting = teams.rig, teams.plan, teams.actuators.channels_of(teams.best[1])
+    rig, plan, acting = compared.rig, compared.plan, compared.actuators.channels_of(compared.best[1])
     for name, other in alternatives(rig, plan, rig.second_order().modes().frequency_hz, acting):
         signals = other.signals(rig, acting)
-        value = teams.arena.driven(rig, other, acting, teams.arena.noise_std).figure(channels)
+        value = compared.arena.driven(rig, other, acting, compared.arena.noise_std).figure(channels)
         yield Drive(name, total_duration(signals, other.sample_rate), peak(signals), value)
 
 
-def _warnings(teams: Teams, size: float) -> Iterator[str]:
-    plan = teams.plan
+def _warnings(compared: Compared, size: float) -> Iterator[str]:
+    plan = compared.plan
     yield (
         f"a cause is taken to change the outputs by {100 * size:g} % of their RMS over all candidates, and the noise is "
         + (f"{plan.noise_percent:g} % of the RMS of each output" if not plan.noise else "as given")
         + f"; masses, stiffnesses and dampings are {OFF:g} tolerances off; other sizes and noises may favour other places"
     )
-    if len(teams.tried) < teams.n_teams:
+    if len(compared.tried) < compared.n_sets:
         yield (
-            f"of {teams.n_teams} sets of actuators {len(teams.tried)} were compared, those that drive the faintest mode most "
-            "first, then others by exchange; fix or forbid actuators to compare all"
+            f"of {compared.n_sets} sets of actuators {len(compared.tried)} were compared, those that drive the faintest mode "
+            "most first, then others by exchange; fix or forbid actuators to compare all"
         )
-    if len(teams.figures) < len(teams.tried) * count(
-        len(teams.sensors), teams.n_sensors, n_fixed=len(teams.sensors.fixed)
+    if len(compared.figures) < len(compared.tried) * count(
+        len(compared.sensors), compared.n_sensors, n_fixed=len(compared.sensors.fixed)
     ):
         yield "the sensors found are not proven the best: they were taken away one by one, then exchanged"
-    if not teams.rig.linear:
+    if not compared.rig.linear:
         yield "the model is not linear: effects are those about its planned motion"

@@ -15,8 +15,8 @@ from lab.errors import LabError
 from lab.placement.candidates import Candidates, subsets
 from lab.placement.contest import (
     MEASURES,
-    Choice,
     Contest,
+    Layout,
     contest_of,
     figure,
     figures_of,
@@ -49,7 +49,7 @@ def place_matrices(
     plan: Plan,
     *,
     criterion: str = "a",
-    planned: Choice | None = None,
+    planned: Layout | None = None,
     limit: int | None = None,
 ) -> Placement:
     """The layout that allows the least scatter of M, C and K, and its rivals.
@@ -73,27 +73,27 @@ def place_matrices(
     n_layouts = comb(len(sensors) - len(sensors.fixed), n_sensors - len(sensors.fixed)) * comb(
         len(actuators) - len(actuators.fixed), n_actuators - len(actuators.fixed)
     )
-    choices = possible_layouts(contest) if n_layouts <= LOOKED_AT else []
+    layouts = possible_layouts(contest) if n_layouts <= LOOKED_AT else []
     most = WORK / len(contest.units) ** 3 if limit is None else limit
-    proven = n_layouts <= LOOKED_AT and len(choices) <= most
+    proven = n_layouts <= LOOKED_AT and len(layouts) <= most
     if proven:
-        if not choices:
+        if not layouts:
             raise LabError(impossible(contest))
-        figures = np.array(list(figures_of(contest, choices)))
+        figures = np.array(list(figures_of(contest, layouts)))
         order = np.argsort(figures, kind="stable")
-        best = choices[order[0]]
+        best = layouts[order[0]]
     else:
         figures, order = np.zeros(0), np.zeros(0, dtype=int)
         best = searched(contest)
     ranking = [_ranked("best", contest, best, figures)]
     ranking += [
-        _ranked(f"rank {k + 1}", contest, choices[order[k]], figures) for k in range(1, min(TOLD, len(order)))
+        _ranked(f"rank {k + 1}", contest, layouts[order[k]], figures) for k in range(1, min(TOLD, len(order)))
     ]
     if planned is not None:
         ranking.append(_ranked("planned", contest, planned, figures))
     finite = figures[np.isfinite(figures)]
     if finite.size > 1:
-        ranking.append(_ranked("worst", contest, choices[order[finite.size - 1]], figures))
+        ranking.append(_ranked("worst", contest, layouts[order[finite.size - 1]], figures))
     if not np.isfinite(ranking[0].figure):
         raise LabError(
             "no layout tells all entries of M, C and K in the planned test; excite more modes or record longer"
@@ -109,7 +109,7 @@ def place_matrices(
         proven,
         ranking[0].figure if proven else floor(contest),
         n_layouts,
-        len(choices) if n_layouts <= LOOKED_AT else n_layouts,
+        len(layouts) if n_layouts <= LOOKED_AT else n_layouts,
         np.sort(finite),
         tuple(ranking),
         drives=tuple(_drives(contest, best)),
@@ -129,9 +129,9 @@ def floor(contest: Contest) -> float | None:
     return min(figure(contest.by_sensor(acting).sum(axis=0), contest.criterion) for acting in sets)
 
 
-def _ranked(name: str, contest: Contest, choice: Choice, figures: Array) -> Ranked:
-    sensors, actuators = choice
-    possible = contest.possible(choice)
+def _ranked(name: str, contest: Contest, layout: Layout, figures: Array) -> Ranked:
+    sensors, actuators = layout
+    possible = contest.possible(layout)
     information = contest.by_sensor(actuators)[list(sensors)].sum(axis=0)
     details = {kind: figure(information, kind) if possible else np.inf for kind in MEASURES}
     own = details[contest.criterion]
@@ -148,7 +148,7 @@ def _ranked(name: str, contest: Contest, choice: Choice, figures: Array) -> Rank
     )
 
 
-def _drives(contest: Contest, best: Choice) -> Iterator[Drive]:
+def _drives(contest: Contest, best: Layout) -> Iterator[Drive]:
     """The best layout under other signals of the same largest force, with the noise that it has in the planned test."""
     rig, plan = contest.rig, contest.plan
     inputs, outputs = contest.actuators.channels_of(best[1]), contest.sensors.channels_of(best[0])

@@ -10,18 +10,18 @@ import numpy as np
 
 from lab.errors import LabError
 from lab.placement.candidates import Candidates
-from lab.placement.contest import Choice, Contest, figure, impossible
+from lab.placement.contest import Contest, Layout, figure, impossible
 
 STARTS = 4
 
 
-def searched(contest: Contest) -> Choice:
+def searched(contest: Contest) -> Layout:
     """A good layout where there are too many to compare: exchanges of a sensor, an actuator or both from several starts."""
     rng, found = np.random.default_rng(0), []
     by_sensor = lru_cache(maxsize=128)(contest.by_sensor)
 
-    def value(choice: Choice) -> float:
-        return figure(by_sensor(choice[1])[list(choice[0])].sum(axis=0), contest.criterion)
+    def value(layout: Layout) -> float:
+        return figure(by_sensor(layout[1])[list(layout[0])].sum(axis=0), contest.criterion)
 
     for _ in range(STARTS):
         here = _any_possible(contest, rng)
@@ -37,14 +37,14 @@ def searched(contest: Contest) -> Choice:
     return min(found)[1]
 
 
-def _neighbours(contest: Contest, choice: Choice) -> Iterator[Choice]:
+def _neighbours(contest: Contest, layout: Layout) -> Iterator[Layout]:
     """Possible layouts that differ in one sensor, one actuator, or one of each, as when the two trade places."""
     sensors, actuators = (
         [here, *(tuple(sorted({*here, new} - {old})) for old, new in _trades(here, candidates))]
-        for here, candidates in zip(choice, (contest.sensors, contest.actuators), strict=True)
+        for here, candidates in zip(layout, (contest.sensors, contest.actuators), strict=True)
     )
     for near in product(sensors, actuators):
-        if near != choice and contest.possible(near):
+        if near != layout and contest.possible(near):
             yield near
 
 
@@ -54,7 +54,7 @@ def _trades(chosen: Sequence[int], candidates: Candidates) -> Iterator[tuple[int
     return product(loose, [i for i in range(len(candidates)) if i not in chosen])
 
 
-def _any_possible(contest: Contest, rng: np.random.Generator) -> Choice:
+def _any_possible(contest: Contest, rng: np.random.Generator) -> Layout:
     """A possible layout at random: actuators first, then sensors on what they leave bare and on one that they drive."""
     for _ in range(1000):
         sides: list[tuple[int, ...]] = []

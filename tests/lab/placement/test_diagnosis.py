@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from lab.errors import LabError, UnknownNameError
-from lab.placement import teams
+from lab.placement import diagnosis_search
 from lab.placement.arena import arena_of
 from lab.placement.place import place
 from lab.placement.plan import Plan, driving
@@ -89,7 +89,7 @@ def test_of_too_many_sets_of_actuators_the_likeliest_are_compared_and_that_is_to
     rig, own = row_of_masses(4), plan(noise=5.0)
     causes = ("cubic_stiffness", "coulomb_friction")
     every = place(rig, 2, n_actuators=1, target="diagnosis", plan=own, causes=causes)
-    monkeypatch.setattr(teams, "TEAMS", 2)
+    monkeypatch.setattr(diagnosis_search, "MAX_SETS", 2)
     some = place(rig, 2, n_actuators=1, target="diagnosis", plan=own, causes=causes)
     assert (every.proven, some.proven, some.floor) == (True, False, None)
     assert every.figure <= some.figure

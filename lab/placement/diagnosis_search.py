@@ -1,4 +1,4 @@
-"""Teams: sensors and actuators chosen together for a diagnosis, every set of actuators with the sensors that suit it."""
+"""Sensors and actuators chosen together for a diagnosis: every set of actuators with the sensors that suit it."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ import numpy as np
 
 from lab.placement.arena import Arena, closed
 from lab.placement.candidates import Candidates, subsets
-from lab.placement.contest import Choice
+from lab.placement.contest import Layout
 from lab.placement.plan import Plan
 from lab.placement.search import count
 from lab.placement.shapes import choose_actuators
@@ -18,12 +18,12 @@ from lab.rig import Rig
 
 LIMIT = 200
 """Layouts of sensors up to this number are all compared for every set of actuators."""
-TEAMS = 30
+MAX_SETS = 30
 """Sets of actuators that are compared at most: each takes a simulation of every cause."""
 
 
 @dataclass(eq=False)
-class Teams:
+class Compared:
     """Layouts compared so far.
 
     Attributes:
@@ -49,8 +49,8 @@ class Teams:
     n_sensors: int
     n_actuators: int
     limit: int = LIMIT
-    figures: dict[Choice, float] = field(default_factory=dict)
-    best: Choice = ((), ())
+    figures: dict[Layout, float] = field(default_factory=dict)
+    best: Layout = ((), ())
     arena: Arena = field(init=False)
     tried: dict[tuple[int, ...], float] = field(default_factory=dict)
 
@@ -63,23 +63,23 @@ class Teams:
         )
 
     @property
-    def n_teams(self) -> int:
+    def n_sets(self) -> int:
         """Number of sets of actuators that there are."""
         return count(len(self.actuators), self.n_actuators, n_fixed=len(self.actuators.fixed))
 
     @property
     def n_layouts(self) -> int:
         """Number of layouts that there are."""
-        return self.n_teams * count(len(self.sensors), self.n_sensors, n_fixed=len(self.sensors.fixed))
+        return self.n_sets * count(len(self.sensors), self.n_sensors, n_fixed=len(self.sensors.fixed))
 
     @property
     def proven(self) -> bool:
         """Whether every layout was compared."""
         return len(self.figures) == self.n_layouts
 
-    def compare(self) -> None:
+    def search(self) -> None:
         """Compares all sets of actuators, or, of too many, those an exchange comes upon, the likeliest ones first."""
-        if self.n_teams <= TEAMS:
+        if self.n_sets <= MAX_SETS:
             for acting in subsets(len(self.actuators), self.n_actuators, self.actuators.fixed):
                 self.look(acting)
             return
@@ -108,7 +108,7 @@ class Teams:
 
     def inseparable(self) -> np.ndarray:
         """Whether no layout tells two causes apart, shape (n_keys, n_keys)."""
-        if len(self.tried) == self.n_teams:
+        if len(self.tried) == self.n_sets:
             return closed(self.parallel & self.together)
         # Of sets that were not looked at, all actuators together know most.
         return closed(self.parallel & self.everything.alike)
@@ -120,7 +120,7 @@ class Teams:
             near = tuple(sorted({*here, new} - {old}))
             if near in self.tried:
                 continue
-            if len(self.tried) >= TEAMS:
+            if len(self.tried) >= MAX_SETS:
                 return None
             self.look(near)
             if self.tried[near] < self.tried[here] * (1 - 1e-9):
