@@ -113,7 +113,7 @@ def alternative_table(diagnosis: Diagnosis) -> Table:
 
 
 @dataclass(frozen=True)
-class Ranked:
+class Weighed:
     """A cause that was weighed, and its evidence.
 
     Attributes:
@@ -127,14 +127,14 @@ class Ranked:
     found: bool
 
 
-def ranked_causes(diagnosis: Diagnosis) -> tuple[Ranked, ...]:
+def weighed_causes(diagnosis: Diagnosis) -> tuple[Weighed, ...]:
     """The findings in their order, then the other explanations of the first one, best first."""
     findings = [
-        Ranked(f"{words(f.effect.cause)} at {place(f.effect.location)}", f.log_evidence_gain, True)
+        Weighed(f"{words(f.effect.cause)} at {place(f.effect.location)}", f.log_evidence_gain, True)
         for f in diagnosis.findings
     ]
     others = [
-        Ranked(f"{words(a.cause)} at {place(a.location)}", a.log_evidence_gain, False)
+        Weighed(f"{words(a.cause)} at {place(a.location)}", a.log_evidence_gain, False)
         for a in diagnosis.alternatives
     ]
     return (*findings, *others)

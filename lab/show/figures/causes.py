@@ -8,7 +8,7 @@ from matplotlib.figure import Figure
 from lab.diagnosis.outcome import Diagnosis
 from lab.show.drawing import SERIES
 from lab.show.figures.canvas import Drawing, drawing, plain
-from lab.show.findings import evidence, ranked_causes
+from lab.show.findings import evidence, weighed_causes
 from lab.validation import COVERAGE
 
 DECISIVE = 5.0
@@ -17,7 +17,7 @@ DECISIVE = 5.0
 
 def causes_figure(diagnosis: Diagnosis) -> Drawing | None:
     """A bar for each cause weighed, the findings first; None where none was."""
-    ranked = ranked_causes(diagnosis)
+    ranked = weighed_causes(diagnosis)
     if not ranked:
         return None
     gain = np.array([each.log_evidence_gain for each in ranked])

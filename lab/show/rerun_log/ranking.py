@@ -8,7 +8,7 @@ import rerun.blueprint as rrb
 
 from lab.diagnosis.outcome import Diagnosis
 from lab.show.drawing import SERIES, rgb
-from lab.show.findings import Ranked, evidence, ranked_causes
+from lab.show.findings import Weighed, evidence, weighed_causes
 from lab.show.rerun_log.plot import log_texts
 
 ORIGIN = "/causes"
@@ -18,7 +18,7 @@ WIDTH, STEP = 200.0, 20.0
 
 def log_ranking(stream: rr.RecordingStream, diagnosis: Diagnosis) -> list[rrb.View]:
     """Logs the bars, findings first; one view, or none where no cause was weighed."""
-    ranked = ranked_causes(diagnosis)
+    ranked = weighed_causes(diagnosis)
     if not ranked:
         return []
     length = _lengths(ranked)
@@ -43,7 +43,7 @@ def log_ranking(stream: rr.RecordingStream, diagnosis: Diagnosis) -> list[rrb.Vi
     return [rrb.Spatial2DView(origin=ORIGIN, name=name, visual_bounds=bounds)]
 
 
-def _lengths(ranked: tuple[Ranked, ...]) -> np.ndarray:
+def _lengths(ranked: tuple[Weighed, ...]) -> np.ndarray:
     """Length of each bar: evidence spans many powers of ten, so its logarithm is drawn."""
     gain = np.array([each.log_evidence_gain for each in ranked])
     level = np.log10(1 + np.maximum(np.nan_to_num(gain, posinf=1e300), 0.0))
