@@ -27,6 +27,7 @@ if TYPE_CHECKING:
     )
     from identification.fdd import fdd
     from identification.frequency_domain import plscf_recording
+    from identification.from_responses import identify_responses
     from identification.identify import Identification, identify
     from identification.lsfd import lsfd
     from identification.methods import METHODS
@@ -65,6 +66,7 @@ _MODULES = {
         "RecordingError",
         "TooShortError",
     ),
+    "from_responses": ("identify_responses",),
     "identify": ("Identification", "identify"),
     "methods": ("METHODS",),
     "modes": (
@@ -128,6 +130,7 @@ __all__ = [
     "fdd",
     "frequency_response",
     "identify",
+    "identify_responses",
     "lsfd",
     "mac",
     "markov_parameters",

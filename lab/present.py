@@ -8,6 +8,7 @@ from pathlib import Path
 import numpy as np
 
 from identification.recording import Recording
+from identification.response import FrequencyResponse
 from lab.excitation import Excitation
 from lab.files.checksum import sha256_of
 from lab.files.results import save_result
@@ -24,7 +25,7 @@ PERIODS_SHOWN = 20
 def present(
     folder: Path,
     result: Result,
-    recording: Recording,
+    recording: Recording | FrequencyResponse,
     *,
     command: str = "",
     scenario: Scenario | None = None,
@@ -36,7 +37,7 @@ def present(
     Args:
         folder: to write into.
         result: what to tell.
-        recording: what it was identified from.
+        recording: what it was identified from: samples, or frequency responses.
         command: how the lab was called.
         scenario: the test behind it, if there is one.
         rig: the rig behind it, if there is one.
@@ -67,7 +68,9 @@ def _given(source: str | Path | None, scenario: Scenario | None) -> dict[str, st
     return {name: f"{path}, SHA-256 {sha256_of(path)}" for name, path in files.items()}
 
 
-def _facts(recording: Recording, rig: Rig | None, scenario: Scenario | None) -> dict[str, str]:
+def _facts(
+    recording: Recording | FrequencyResponse, rig: Rig | None, scenario: Scenario | None
+) -> dict[str, str]:
     """What it takes to repeat the test, besides what the report knows by itself."""
     facts = {
         "Inputs": ", ".join(channel.name for channel in recording.inputs) or "none",
@@ -77,7 +80,8 @@ def _facts(recording: Recording, rig: Rig | None, scenario: Scenario | None) -> 
         facts["Model"] = f"{rig.name}, degrees of freedom {', '.join(rig.dofs)}"
     if scenario is not None:
         facts["Seed"] = str(scenario.seed)
-    for name, value in recording.attributes.items():
+    attributes = recording.attributes if isinstance(recording, Recording) else {}
+    for name, value in attributes.items():
         facts[name.replace("_", " ").capitalize()] = value if isinstance(value, str) else f"{value:g}"
     return facts
 

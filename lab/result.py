@@ -59,7 +59,7 @@ class Result:
 
     Attributes:
         title: what was tested.
-        sample_rate: of the recording [Hz].
+        sample_rate: of the recording [Hz]; infinite for responses to forces that vary continuously.
         modes: identified modes, sorted by frequency.
         stable: whether each mode stayed put over the model orders.
         second_order: identified M, C, K, or None.

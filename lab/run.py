@@ -10,13 +10,17 @@ from typing import Any
 
 import numpy as np
 
-from identification.identify import identify
+from identification.errors import RecordingError
+from identification.from_responses import identify_responses
+from identification.identify import Identification, identify
 from identification.recording import Recording
+from identification.response import FrequencyResponse
 from lab.compare import compare
 from lab.criteria import judge
 from lab.errors import RigError
 from lab.files.folder import output_folder
 from lab.files.recording import load
+from lab.files.recording_responses import load_responses, only_responses
 from lab.instruments import instrument
 from lab.loads import Sampling
 from lab.present import present
@@ -88,7 +92,7 @@ def identify_file(
     """What a recording file tells by itself: modes, and M, C, K where the set-up allows.
 
     Args:
-        path: recording file.
+        path: recording file; where it holds no samples, its frequency responses are taken.
         out: folder to come, with result.json, report.html and run.rrd.
         method: name, as in `lab list methods`; chosen from the data when None.
         order: number of states; chosen from the data when None.
@@ -101,9 +105,16 @@ def identify_file(
         LabError, IdentificationError: the file or the request is wrong, or the folder cannot be written.
     """
     with output_folder(out, force=force) as folder:
-        recording = load(path)
-        result = examine(recording, method, order=order, refine=refine, **settings)
-        present(folder, result, recording, command=command, source=path)
+        data: Recording | FrequencyResponse
+        if only_responses(path):
+            if refine:
+                raise RecordingError(f"{path} holds frequency responses alone; to refine, samples are needed")
+            data = load_responses(path)
+            result = examine_responses(data, method, order=order, **settings)
+        else:
+            data = load(path)
+            result = examine(data, method, order=order, refine=refine, **settings)
+        present(folder, result, data, command=command, source=path)
     return result
 
 
@@ -166,9 +177,37 @@ def examine(
         IdentificationError: the recording or the request is at fault.
     """
     found = identify(recording, method, order=order, dofs=dofs, refine=refine, **settings)
+    return _result(found, recording.title, recording.sample_rate)
+
+
+def examine_responses(
+    response: FrequencyResponse,
+    method: str | None = None,
+    *,
+    order: int | None = None,
+    dofs: Sequence[str] | None = None,
+    **settings: Any,
+) -> Result:
+    """The result of identifying frequency responses; its sample rate is infinite where they are continuous in time.
+
+    Args:
+        response: in SI units.
+        method: as for `identify_responses`.
+        order: number of states; chosen from the data when None.
+        dofs: names of the degrees of freedom of M, C, K, in the order wanted.
+        settings: further settings of the method.
+
+    Raises:
+        IdentificationError: the responses or the request are at fault.
+    """
+    found = identify_responses(response, method, order=order, dofs=dofs, **settings)
+    return _result(found, "", 1 / response.dt if response.dt else float("inf"))
+
+
+def _result(found: Identification, title: str, sample_rate: float) -> Result:
     return Result(
-        title=recording.title,
-        sample_rate=recording.sample_rate,
+        title=title,
+        sample_rate=sample_rate,
         modes=found.modes.normalized(),
         stable=tuple(found.stable),
         second_order=found.second_order,

@@ -27,7 +27,10 @@ def summary(result: Result) -> str:
 
 def _headline(result: Result) -> str:
     found = result.realization
-    return f"{result.title}\n{found.method}, order {found.order}, sampled at {result.sample_rate:g} Hz"
+    rate = (
+        f"sampled at {result.sample_rate:g} Hz" if np.isfinite(result.sample_rate) else "continuous in time"
+    )
+    return f"{result.title}\n{found.method}, order {found.order}, {rate}".lstrip("\n")
 
 
 def _matrices(result: Result) -> str:

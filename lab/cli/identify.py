@@ -1,4 +1,4 @@
-"""`lab identify`: modes and matrices of any recording."""
+"""`lab identify`: modes and matrices of any recording, or of frequency responses."""
 
 from __future__ import annotations
 
@@ -34,7 +34,10 @@ def command(
     order: int | None,
     refine: bool,
 ) -> None:
-    """Modes, and M, C, K where the set-up allows, of any recording, real or virtual."""
+    """Modes, and M, C, K where the set-up allows, of any recording, real or virtual.
+
+    Of a file that holds frequency responses and no samples, the responses are taken, by pLSCF.
+    """
     from lab.run import identify_file
 
     folder = out or Path("out") / f"{name_of_recording(recording)}_modes"

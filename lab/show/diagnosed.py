@@ -22,10 +22,4 @@ def about(diagnosis: Diagnosis, data: Diagnosed) -> str:
     rig = diagnosis.nominal
     size = f"{counted(len(rig.dofs), 'degree of freedom', 'degrees of freedom')}, {counted(len(rig.springs), 'spring')}"
     model = f"Model {rig.name} ({size}) held against"
-    if isinstance(data, FrequencyResponse):
-        f = data.frequency_hz
-        return (
-            f"{model} the frequency responses of {counted(len(data.outputs), 'output')} to "
-            f"{counted(len(data.inputs), 'input')}, {f.size} lines from {f[0]:g} to {f[-1]:g} Hz."
-        )
     return f"{model} {recorded(data)}."

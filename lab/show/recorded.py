@@ -3,12 +3,20 @@
 from __future__ import annotations
 
 from identification.recording import Recording
+from identification.response import FrequencyResponse
 from lab.show.signals import measured_inputs
 from lab.show.verdict import counted
 
 
-def recorded(recording: Recording) -> str:
-    """Records, channels, length and rate, as the end of a sentence."""
+def recorded(recording: Recording | FrequencyResponse) -> str:
+    """Records, channels, length and rate, or channels and lines of frequency responses, as the end of a sentence."""
+    if isinstance(recording, FrequencyResponse):
+        f = recording.frequency_hz
+        return (
+            f"the frequency responses of {counted(len(recording.outputs), 'output')} to "
+            f"{counted(len(recording.inputs), 'input')}, "
+            f"{f.size} lines from {f[0]:g} to {f[-1]:g} Hz"
+        )
     kinds = ", ".join(sorted({record.kind.replace("_", " ") for record in recording.records}))
     return (
         f"{counted(len(recording.records), 'record')} ({kinds}) with "

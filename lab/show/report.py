@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import Any
 
 from identification.recording import Recording
+from identification.response import FrequencyResponse
 from lab.result import Result
 from lab.show.figures import draw, matrix_maps
 from lab.show.page import checksums, inline, surroundings, template
@@ -30,7 +31,7 @@ BESIDE = ("recording.h5", "result.json")
 def write_report(
     path: str | Path,
     result: Result,
-    recording: Recording,
+    recording: Recording | FrequencyResponse,
     *,
     scenario_text: str = "",
     command: str = "",
@@ -66,7 +67,7 @@ def write_report(
     path.write_text(page, encoding="utf-8", newline="\n")
 
 
-def _about(result: Result, recording: Recording) -> str:
+def _about(result: Result, recording: Recording | FrequencyResponse) -> str:
     realization = result.realization
     return f"Identified by {realization.method}, order {realization.order}, from {recorded(recording)}."
 

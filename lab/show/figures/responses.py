@@ -10,6 +10,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from identification.recording import Channel, Recording
+from identification.response import FrequencyResponse
 from identification.systems import StateSpace
 from lab.result import Result
 from lab.show.drawing import SERIES
@@ -35,13 +36,13 @@ FINE = 1000
 """Evenly spaced points of a Nyquist curve."""
 
 
-def responses(recording: Recording, spectrum: Spectra, result: Result) -> Drawing | None:
+def responses(recording: Recording | FrequencyResponse, spectrum: Spectra, result: Result) -> Drawing | None:
     """Magnitude and phase of a few responses, measured and of the identified model; None without inputs."""
     measured = frequency_response(spectrum)
     if measured is None:
         return None
     pairs = chosen_pairs(recording.inputs, recording.outputs)
-    top = upper_frequency(recording.sample_rate, result.modes.frequency_hz)
+    top = upper_frequency(result.sample_rate, result.modes.frequency_hz)
     shown = (spectrum.frequency_hz <= top) & (spectrum.frequency_hz > 0)
     frequency = spectrum.frequency_hz[shown]
     system, fine = result.realization.system, np.linspace(frequency[0], frequency[-1], 400)
@@ -77,8 +78,9 @@ def responses(recording: Recording, spectrum: Spectra, result: Result) -> Drawin
         frames[0, 0].legend(loc="best")
 
     total = len(recording.inputs) * len(recording.outputs)
+    kind = " (H1)" if isinstance(recording, Recording) else ""
     caption = (
-        "Frequency responses (H1), magnitude (left in units, right in decibels) and phase: grey measured, dashed the "
+        f"Frequency responses{kind}, magnitude (left in units, right in decibels) and phase: grey measured, dashed the "
         "identified model."
     )
     if spectrum.window == "none" and spectrum.remainder > 0.01:
@@ -88,7 +90,7 @@ def responses(recording: Recording, spectrum: Spectra, result: Result) -> Drawin
     return drawing("frf", 0.3 + 2.7 * n_rows, caption, paint)
 
 
-def nyquist(recording: Recording, spectrum: Spectra, result: Result) -> Drawing | None:
+def nyquist(recording: Recording | FrequencyResponse, spectrum: Spectra, result: Result) -> Drawing | None:
     """Imaginary over real part of the same responses, with the identified modes on them; None without inputs."""
     measured = frequency_response(spectrum)
     if measured is None:
@@ -97,9 +99,7 @@ def nyquist(recording: Recording, spectrum: Spectra, result: Result) -> Drawing 
     # Beyond the modes to be trusted noise would fill the picture.
     stable = result.modes.frequency_hz[np.array(result.stable, dtype=bool)]
     marked = stable if stable.size else result.modes.frequency_hz
-    top = min(
-        recording.sample_rate / 2, 1.1 * float(np.max(marked, initial=0.0)) or recording.sample_rate / 2
-    )
+    top = min(result.sample_rate / 2, 1.1 * float(np.max(marked, initial=0.0)) or result.sample_rate / 2)
     shown = (spectrum.frequency_hz <= top) & (spectrum.frequency_hz > 0)
     if not shown.any():
         return None

@@ -16,15 +16,18 @@ import rerun as rr
 import rerun.blueprint as rrb
 
 from identification.recording import Recording
+from identification.response import FrequencyResponse
 from lab.result import Result
 from lab.show.rerun_log.channels import log_channels
 from lab.show.rerun_log.matrices import log_mac, log_matrices
 from lab.show.rerun_log.modes import MODES_SHARE, grid_columns, log_modes
 from lab.show.rerun_log.plot import plain
+from lab.show.rerun_log.responses import log_responses
 from lab.show.rerun_log.scene import log_motion, motion_frames, time_panel
 from lab.show.rerun_log.spectra import log_channel_spectra
 from lab.show.rerun_log.stabilization import log_stabilization
-from lab.show.signals import spectra
+from lab.show.response_spectra import drawable, response_spectra
+from lab.show.signals import Spectra, spectra
 from lab.show.tables import validation_rows
 from lab.show.verdict import mode_rows, verdict
 
@@ -41,7 +44,7 @@ MAX_LINES = 2
 def write_rrd(
     path: str | Path,
     result: Result,
-    recording: Recording,
+    recording: Recording | FrequencyResponse,
     *,
     rig: Rig | None = None,
     motion: Motion | None = None,
@@ -72,10 +75,17 @@ def write_rrd(
         )
         end = float(motion.time[shown[-1]]) if motion is not None and shown is not None else 0.0
         scene = log_motion(stream, rig, motion, shown) if rig is not None and motion is not None else []
-        spectrum = spectra(recording)
-        lines = log_channel_spectra(stream, recording, spectrum, result.modes.frequency_hz)
+        if isinstance(recording, FrequencyResponse):
+            result = drawable(result, recording)
+            spectrum: Spectra | None = response_spectra(recording)
+            series: list[rrb.View] = []
+            lines = log_responses(stream, result, recording)
+        else:
+            spectrum = spectra(recording)
+            series = log_channels(stream, recording)
+            lines = log_channel_spectra(stream, recording, spectrum, result.modes.frequency_hz)
         tabs = [
-            _test_tab(scene, log_channels(stream, recording), lines),
+            _test_tab(scene, series, lines),
             _modes_tab(
                 log_modes(stream, result, rig, end),
                 log_stabilization(stream, result, spectrum),
