@@ -30,6 +30,7 @@ from lab.diagnosis.spectral.fit import SpectralFit, fit
 from lab.diagnosis.spectral.recorded import Recorded
 from lab.diagnosis.spectral.responses import Responses
 from lab.diagnosis.spectral.search import drifting, search
+from lab.diagnosis.spectral.smallest import in_words, smallest_changes, smallest_drifts
 from lab.diagnosis.spectral.stage import Stage, confirmed, predicted, settled, with_cause, without_idle
 from lab.diagnosis.spectral.tones import FoundTone
 from lab.diagnosis.words import advice, says
@@ -96,6 +97,7 @@ def diagnose_spectra(
     given = _as_given(stage.likelihood, stage.fit)
     first: list[Candidate | FoundTone] = []
     refused: Candidate | FoundTone | None = None
+    looks = 1
     while len(stage.accepted) < MOST_FINDINGS:
         tell("searching for causes" if not stage.accepted else f"searching on, {len(stage.accepted)} found")
         ranked, looks = _ranked(stage, visible, given if not stage.accepted else None)
@@ -110,7 +112,8 @@ def diagnose_spectra(
             refused = ranked[0]
             break
         first, stage = first or ranked, without_idle(step)
-    return _outcome(stage, origin, given, nominal, rig, first, refused)
+    told = _outcome(stage, origin, given, nominal, rig, first, refused)
+    return replace(told, unlearnable=_too_small(stage, visible, evidence_threshold(looks)))
 
 
 def evidence_threshold(looks: int) -> float:
@@ -120,6 +123,17 @@ def evidence_threshold(looks: int) -> float:
     (Bonferroni), and a factor e⁵, decisive on Jeffreys' scale, is asked beyond.
     """
     return 2 * float(np.log(max(looks, 1))) + 10
+
+
+def _too_small(stage: Stage, effects: Mapping[str, type[Effect]], needed: float) -> tuple[str, ...]:
+    """How large a change must be for these data to name it, one sentence each."""
+    sizes = smallest_changes(stage.likelihood, stage.fit, needed)
+    sizes = {cause: each for cause, each in sizes.items() if cause in effects}
+    if "stiffness_drift" not in effects or any(c.cause == "stiffness_drift" for c in stage.accepted):
+        return in_words(sizes, [])
+    parts = stage.experiment.in_parts(stage.likelihood)
+    drift = effects["stiffness_drift"]
+    return in_words(sizes, None if parts is None else smallest_drifts(parts, stage.fit, drift, needed))
 
 
 def _experiment(
