@@ -13,3 +13,5 @@ DRIFT       p0 s x, s the share of the record that has passed
 """
 
 CUBIC, QUADRATIC, BILINEAR, DEADBAND, STOP, COULOMB, BOUC_WEN, DRIFT = range(8)
+KINKED = (BILINEAR, DEADBAND, STOP, COULOMB)
+"""Laws whose slope jumps."""

@@ -65,17 +65,17 @@ def calibrate(misfit: Misfit, rig: Rig) -> Calibration:
     for share in SHARES:
         gain = kalman_gain(misfit, theta, share)
         levels[share] = fit(misfit, theta, observer=gain, iterations=2, tolerance=5).objective
-    plain = fit(misfit, theta, iterations=8)
+    plain = fit(misfit, theta, iterations=20)
     late = moving(misfit, plain)
     if late:
         misfit = with_starts(misfit, late)
         theta, begun = (np.append(t, np.zeros(misfit.parameters.n - t.size)) for t in (theta, plain.theta))
-        plain = fit(misfit, begun, iterations=8)
+        plain = fit(misfit, begun, iterations=20)
     levels[0.0] = plain.objective
     share = min(levels, key=lambda s: levels[s])
     start_theta = theta if share else plain.theta
     guided = fit(misfit, start_theta, observer=kalman_gain(misfit, start_theta, share), iterations=5)
-    again = fit(misfit, guided.theta, iterations=8)
+    again = fit(misfit, guided.theta, iterations=20)
     best = min(plain, again, key=lambda f: f.objective)
     misfit = replace(misfit, survey=survey_of(misfit, rig, best.theta, best.residual))
     return Calibration(misfit, best, guided, share)

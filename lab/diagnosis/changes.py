@@ -2,21 +2,24 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
 
 import numpy as np
 
 from identification.recording import Array
 from lab.diagnosis.fit import Fit, fit, objective
-from lab.diagnosis.misfit import Misfit, Parameters
+from lab.diagnosis.misfit import Hypothesis, Misfit, Parameters
 from lab.diagnosis.starts import best_starts
 from lab.effects.effect import EVERYWHERE, Effect
+from lab.effects.missing_spring import MissingSpring
 
 OWN_PARAMETERS = {"mass": "mass_change", "stiffness": "stiffness_change", "damping": "damping_change"}
 FACTORS = np.geomspace(1 / 4, 4, 28)
 """So close that a lightly damped resonance is not stepped over in a window of ten swings."""
 DAMPING_FACTORS = np.geomspace(1 / 16, 16, 16)
+SPRING_FACTORS = np.geomspace(0.03, 3, 14)
+"""Stiffness of a missing spring over what its place has already."""
 WINDOW = 1024
 """Samples of every record on which factors are tried."""
 WORTH = 20.0
@@ -68,6 +71,38 @@ def large_changes(
             refit = fit(changed, theta, present.causes, observer=present.observer, iterations=15)
             found.append((cause, location, direction, refit))
     return found
+
+
+def stiff_springs(misfit: Misfit, present: Fit, proposed: Sequence[Hypothesis]) -> list[Fit]:
+    """Fits with the likeliest missing springs so stiff that no step from none at all would find them.
+
+    Each is tried at a few stiffnesses, as a large change is, and followed from the best: beside the parameters as they are, and
+    beside nominal ones, since without the spring these may have gone far to make up for it.
+    """
+    window = tuple(min(n, WINDOW) for n in misfit.n_train)
+    P = misfit.parameters.precision
+    nominal = present.theta - P @ present.theta
+    followed = []
+    for theta in (present.theta, nominal):
+
+        def level(causes: Sequence[Hypothesis], theta: Array = theta) -> float:
+            e = misfit.residual(theta, causes, observer=present.observer, n_train=window)
+            return objective(e, theta, P, misfit.colour)
+
+        reference = level(present.causes) - WORTH
+        best = []
+        for h in proposed:
+            if h.kind is MissingSpring:
+                trials = [h.at(np.array([factor])) for factor in SPRING_FACTORS]
+                best.append(
+                    min(((level((*present.causes, t)), t) for t in trials), key=lambda trial: trial[0])
+                )
+        best.sort(key=lambda trial: trial[0])
+        followed += [(theta, h) for reached, h in best[: FOLLOWED // 2] if reached < reference]
+    return [
+        fit(misfit, theta, (*present.causes, h), observer=present.observer, iterations=15)
+        for theta, h in followed
+    ]
 
 
 def _restarted(misfit: Misfit, theta: Array) -> Array:

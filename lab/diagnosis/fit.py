@@ -11,10 +11,15 @@ import numpy as np
 
 from identification.recording import Array
 from lab.diagnosis.misfit import Hypothesis, Misfit
+from lab.forces import KINKED
 from lab.plant import NO_OBSERVER
 
-STEP, CAUSE_STEP = 3e-2, 1e-3
-"""Difference steps: in widths of the prior, and in units of a cause's scale."""
+STEP, KINKED_STEP, CAUSE_STEP = 1e-3, 3e-2, 1e-3
+"""Difference steps: in widths of the prior, so small that valleys are followed, but wide enough to see past the jags that kinks
+make; and in units of a cause's scale."""
+EASED, LEAST = 30.0, 1e-8
+"""Damping falls by so much after a good step, and so far: along a valley where only the prior tells, such as all masses,
+stiffnesses and dampings against the gain of the only actuator, the curvature is that much less than across."""
 POOL = ThreadPoolExecutor(min(cpu_count() or 1, 8))
 
 
@@ -76,11 +81,12 @@ def theta_slopes(
     n_train: Sequence[int] | None,
 ) -> Array:
     """Derivative of the residual by every parameter, (n_parameters, n_outputs, n_total)."""
+    step = KINKED_STEP if any(law.kind in KINKED for law in misfit.plant(theta, causes).laws) else STEP
 
     def slope(j: int) -> Array:
         moved = theta.copy()
-        moved[j] += STEP
-        return (misfit.residual(moved, causes, observer=observer, n_train=n_train) - residual) / STEP
+        moved[j] += step
+        return (misfit.residual(moved, causes, observer=observer, n_train=n_train) - residual) / step
 
     return np.array(list(POOL.map(slope, range(theta.size)))).reshape(-1, *residual.shape)
 
@@ -188,7 +194,7 @@ def fit(
                 break
             age, damping = refresh, 1e-2
             continue
-        theta, causes, e, f, damping = trial, trial_causes, trial_e, trial_f, max(damping / 8, 1e-6)
+        theta, causes, e, f, damping = trial, trial_causes, trial_e, trial_f, max(damping / EASED, LEAST)
         if step < tolerance:
             if fresh:
                 break

@@ -11,12 +11,13 @@ import numpy as np
 from identification.recording import Array
 from lab.diagnosis.calibrate import Calibration
 from lab.diagnosis.chance import NO_CHANCE, Chance, quantile
-from lab.diagnosis.changes import large_changes
+from lab.diagnosis.changes import large_changes, stiff_springs
 from lab.diagnosis.evidence import minus_two_log_evidence
 from lab.diagnosis.fit import POOL, Fit, cause_slopes, fit, moved_by, objective, theta_slopes, weights
 from lab.diagnosis.misfit import Hypothesis, Misfit
 from lab.diagnosis.observer import kalman_gain
 from lab.diagnosis.places import echoes, mends, tone
+from lab.diagnosis.plausible import plausible
 from lab.effects.effect import EVERYWHERE, Effect
 
 OWN_PARAMETERS = {"mass": "mass_change", "stiffness": "stiffness_change", "damping": "damping_change"}
@@ -46,7 +47,7 @@ class Candidate:
         gain: 2 log evidence gained over the model without it.
         guided: the fit on its way, while measurements still guided the state.
         direction: among the model's parameters, for a change of what the model has already.
-        beside: direction of a second such change without which this one does not show; the gain is what this one adds to it.
+        beside: direction of a second such change without which this one does not show; the gain is half of what both bring.
     """
 
     cause: str
@@ -58,8 +59,8 @@ class Candidate:
     beside: Array | None = None
 
 
-_Start = tuple[Hypothesis, Array, Array, float, float]
-"""A hypothesis, its residual, what is left of it with the model's parameters projected out, objective, damping."""
+_Start = tuple[Hypothesis, Array, Array, Array, float, float]
+"""A hypothesis, its residual, what is left of it with the model's parameters projected out, these, objective, damping."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -116,37 +117,40 @@ def screen(
     H = np.linalg.pinv(J @ J.T + prior, rcond=1e-13, hermitian=True)
     chance = Chance(e.shape, sum(misfit.n_train) * len(e))
 
-    def projected(r: Array) -> tuple[Array, float]:
-        """Residual less what the model's parameters can explain of it, and its objective."""
+    def projected(r: Array) -> tuple[Array, Array, float]:
+        """Residual less what the model's parameters can explain of it, the parameters then, and the objective."""
         d = -H @ (J @ (r * w[:, None]).ravel() + prior[:, :n] @ theta)
         left = r + np.tensordot(d, slopes, axes=1)
-        return left, objective(left, theta + d[:n], P, colour)
+        return left, theta + d[:n], objective(left, theta + d[:n], P, colour)
 
-    def own_slopes(h: Hypothesis, r: Array) -> Array:
-        """Slopes of the residual by a hypothesis' own variables, with what the model's parameters can explain projected out."""
+    def own_slopes(h: Hypothesis, r: Array) -> tuple[Array, Array]:
+        """Slopes of the residual by a hypothesis' own variables, the model's parameters following, and slopes of these."""
         own = cause_slopes(misfit, theta, [*present, h], observer, r, n_train)[-h.n :]
-        return np.array([x - np.tensordot(H @ (J @ (x * w[:, None]).ravel()), slopes, axes=1) for x in own])
+        follow = np.array([-H @ (J @ (x * w[:, None]).ravel()) for x in own])
+        return own + np.tensordot(follow, slopes, axes=1), follow[:, :n]
 
-    def stepped(started: _Start, own: Array) -> _Start:
+    def stepped(started: _Start, own: Array, follow: Array) -> _Start:
         """A start after a Gauss-Newton step on its own variables; itself where none helps."""
-        h, _, left, f, damping = started
+        h, _, left, parameters, f, damping = started
         v = weights(left, colour)
         A = (own * v[:, None]).reshape(h.n, -1)
-        G, g = A @ A.T, A @ (left * v[:, None]).ravel()
+        # What a cause explains, the parameters need not: the prior is relieved.
+        G = A @ A.T + follow @ P @ follow.T
+        g = A @ (left * v[:, None]).ravel() + follow @ P @ parameters
         if not (np.all(np.isfinite(G)) and np.trace(G) > 0):
             return started
         for _ in range(4):
             step = -np.linalg.solve(G + (damping * np.diag(np.diag(G)) + 1e-9 * np.trace(G) * np.eye(h.n)), g)
             (trial,) = moved_by([h], step)
             trial_r = misfit.residual(theta, [*present, trial], observer=observer, n_train=n_train)
-            trial_left, trial_f = projected(trial_r)
+            trial_left, trial_parameters, trial_f = projected(trial_r)
             if trial_f < f:
-                return trial, trial_r, trial_left, trial_f, damping / 5
+                return trial, trial_r, trial_left, trial_parameters, trial_f, damping / 5
             damping = max(damping, 1e-2) * 10
         return started
 
     def score(started: _Start) -> float:
-        h, f = started[0], started[3]
+        h, f = started[0], started[4]
         found = base - f - max(h.n, 1) * float(np.log(e.size))
         return found if np.isfinite(found) else -np.inf
 
@@ -154,18 +158,18 @@ def screen(
         """A hypothesis after one step, and what it would have gained from noise."""
         r = misfit.residual(theta, [*present, h], observer=observer, n_train=n_train)
         started: _Start = (h, r, *projected(r), 1e-2)
-        if not (h.n and np.isfinite(started[3])):
+        if not (h.n and np.isfinite(started[4])):
             return started, NO_CHANCE
-        own = own_slopes(h, r)
+        own, follow = own_slopes(h, r)
         lucky = chance.tones if tone(h) is not None else chance.gains(own * w[:, None])
-        return stepped(started, own), lucky
+        return stepped(started, own, follow), lucky
 
     def followed(started: _Start) -> _Start:
         """A start after a few steps more."""
-        for _ in range(3 if started[0].n and np.isfinite(started[3]) else 0):
-            before = started[3]
-            started = stepped(started, own_slopes(started[0], started[1]))
-            if before - started[3] < 1:
+        for _ in range(3 if started[0].n and np.isfinite(started[4]) else 0):
+            before = started[4]
+            started = stepped(started, *own_slopes(started[0], started[1]))
+            if before - started[4] < 1:
                 break
         return started
 
@@ -219,6 +223,9 @@ def search(
         for cause, place, direction, found in large_changes(misfit, present, effects)
         if not mends(effects[cause], place, [(each.kind, each.location) for each in causes], survey)
     ]
+    candidates += [_candidate(found, None, without) for found in stiff_springs(misfit, present, proposed)]
+    band = 1 / survey.duration, 0.5 / survey.dt
+    candidates = [c for c in candidates if c.direction is not None or plausible(c.fit.causes[-1], band)]
     ranked: dict[tuple[str, str], Candidate] = {}
     for candidate in sorted(candidates, key=lambda c: -c.gain):
         ranked.setdefault((candidate.cause, candidate.location), candidate)
@@ -283,14 +290,13 @@ def leading(fits: Sequence[Fit]) -> list[Fit]:
 def _confirmed(misfit: Misfit, candidate: Candidate, without: float) -> Candidate:
     """The candidate, a change of the model's own, fitted with its prior lifted: what a quadratic promises may not come true."""
     assert candidate.direction is not None
-    parameters = misfit.parameters.lifted(candidate.direction)
+    parameters, shared = misfit.parameters.lifted(candidate.direction), 1.0
     if candidate.beside is not None:
-        parameters = parameters.lifted(candidate.beside)
-        without = min(without, minus_two_log_evidence(candidate.fit, free=candidate.beside))
+        parameters, shared = parameters.lifted(candidate.beside), 0.5
     changed = replace(misfit, parameters=parameters)
     found = candidate.fit
-    refit = fit(changed, found.theta, found.causes, observer=found.observer, iterations=10, tolerance=0.1)
-    return replace(candidate, fit=refit, gain=without - minus_two_log_evidence(refit))
+    refit = fit(changed, found.theta, found.causes, observer=found.observer, iterations=20, tolerance=0.1)
+    return replace(candidate, fit=refit, gain=shared * (without - minus_two_log_evidence(refit)))
 
 
 def _polished(misfit: Misfit, candidate: Candidate, without: float) -> Candidate:
@@ -373,10 +379,9 @@ def _unmasked(candidates: Sequence[Candidate], without: float) -> list[Candidate
     for i, j in itertools.permutations(far, 2):
         one, other = candidates[i], candidates[j]
         both = without - minus_two_log_evidence(one.fit, free=np.array([one.direction, other.direction]))
-        # What a useless companion costs is no merit.
-        gain = both - max(other.gain, 0.0)
-        if gain > best[i].gain:
-            best[i] = replace(one, gain=gain, beside=other.direction)
+        # Two looks share what they gain together.
+        if 0.5 * both > max(best[i].gain, other.gain):
+            best[i] = replace(one, gain=0.5 * both, beside=other.direction)
     return best
 
 

@@ -8,10 +8,10 @@ import pytest
 from lab.diagnosis.calibrate import parameters_of
 from lab.diagnosis.misfit import LOOSE, Hypothesis
 from lab.diagnosis.outcome import CONSISTENT, EXPLAINED
+from lab.diagnosis.plausible import plausible
 from lab.diagnosis.spectral.diagnose import diagnose_spectra
 from lab.diagnosis.spectral.fit import fit
 from lab.diagnosis.spectral.lifting import free_directions, is_free, let_go
-from lab.diagnosis.spectral.plausible import plausible
 from lab.diagnosis.spectral.responses import Responses
 from lab.diagnosis.spectral.search import candidate, refitted
 from lab.diagnosis.spectral.stage import Stage, settled, with_cause, without_idle
