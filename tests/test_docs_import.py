@@ -60,7 +60,7 @@ def analysed(rig):
 @pytest.mark.slow
 def test_the_commands_run_and_find_the_modes(truth, capsys):
     commands = [line for block in blocks(PAGE, "sh") for line in block.splitlines()]
-    assert len(commands) == 8
+    assert len(commands) == 9
     for command in commands:
         typed, _, remark = command.partition("#")
         with pytest.raises(SystemExit) as ended:
@@ -78,6 +78,8 @@ def test_the_commands_run_and_find_the_modes(truth, capsys):
         shape = np.array([complex(*value) for value in known[k]["shape"].values()])
         ratio = truth.shapes[1, k] / truth.shapes[0, k]
         assert shape[1] / shape[0] == pytest.approx(ratio, rel=1e-4)
+    analysed = read_document("out/my_frf_modes/result.json", form="modal-result", version=1)["modes"]
+    assert [mode["frequency_hz"] for mode in analysed] == pytest.approx(truth.frequency_hz.tolist(), rel=1e-3)
     (program,) = blocks(PAGE, "python")
     names = {}
     exec(program, names)
