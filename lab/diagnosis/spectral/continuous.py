@@ -27,11 +27,10 @@ def continuous_response(plant: Plant, s: Complex) -> Complex:
     Source: Ewins (2000), Modal Testing, 2nd ed., section 2.5, viscous damping.
     """
     tones = np.array([tone.row for tone in plant.tones]).reshape(-1, plant.n_dofs).T
-    X = receptance(plant, s, np.hstack([plant.forces, tones]))
-    H = sum(
-        s[:, None, None] ** power * (rows @ X)
-        for power, rows in enumerate((plant.displacement, plant.velocity, plant.acceleration))
-    )
+    rows = (plant.displacement, plant.velocity, plant.acceleration)
+    X = receptance(plant, s, np.hstack([plant.forces, tones]), np.vstack(rows))
+    moved = np.split(X, 3, axis=1)
+    H = np.asarray(sum(s[:, None, None] ** power * each for power, each in enumerate(moved)))
     pushed = np.ones((s.size, X.shape[2]), dtype=complex)
     for i, path in enumerate(plant.input_paths):
         pushed[:, i] = _through(path, s)
@@ -40,15 +39,15 @@ def continuous_response(plant: Plant, s: Complex) -> Complex:
     return behind_limits(plant, H[:, list(plant.order)] if plant.order else H, s)
 
 
-def receptance(plant: Plant, s: Complex, forces: Array) -> Complex:
-    """(M s² + C_d s + K)⁻¹ times forces (n_dofs, m), shape (n_s, n_dofs, m)."""
+def receptance(plant: Plant, s: Complex, forces: Array, rows: Array) -> Complex:
+    """Rows (n_rows, n_dofs) times (M s² + C_d s + K)⁻¹ times forces (n_dofs, m), shape (n_s, n_rows, m)."""
     n = plant.n_dofs
     # Velocities in units of a typical frequency keep the eigenvectors a good basis.
     omega = np.sqrt(np.linalg.norm(plant.stiffness) / np.linalg.norm(plant.mass)) or 1.0
     inverse = np.linalg.solve(plant.mass, np.hstack([plant.stiffness / omega, plant.damping, forces / omega]))
     A = np.block([[np.zeros((n, n)), omega * np.eye(n)], [-inverse[:, :n], -inverse[:, n : 2 * n]]])
     B = np.vstack([np.zeros(forces.shape), inverse[:, 2 * n :]])
-    return modal_sum(s, A, B, np.eye(n, 2 * n))
+    return modal_sum(s, A, B, np.hstack([rows, np.zeros(rows.shape)]))
 
 
 def behind_limits(plant: Plant, H: Complex, s: Complex) -> Complex:
