@@ -12,6 +12,7 @@ from identification.recording import Array, Recording
 from lab.diagnosis import words
 from lab.diagnosis.baseline import Baseline
 from lab.diagnosis.calibrate import Calibration, calibrate, parameters_of, survey_of
+from lab.diagnosis.candidate import Candidate
 from lab.diagnosis.check import check
 from lab.diagnosis.evidence import minus_two_log_evidence
 from lab.diagnosis.fit import Fit, fit
@@ -29,8 +30,9 @@ from lab.diagnosis.outcome import (
     Quantity,
 )
 from lab.diagnosis.revise import renamed, settled
-from lab.diagnosis.search import Candidate, search, wrong_parameters
+from lab.diagnosis.search import search
 from lab.diagnosis.starts import best_starts, free_decays, starts_of, with_starts
+from lab.diagnosis.tolerance import wrong_parameters
 from lab.diagnosis.unlearnable import unlearnable
 from lab.diagnosis.whiteness import Whiteness, patches, whiteness
 from lab.effects import EFFECTS

@@ -8,7 +8,8 @@ from lab.diagnosis.evidence import minus_two_log_evidence
 from lab.diagnosis.fit import Fit, fit
 from lab.diagnosis.misfit import Misfit
 from lab.diagnosis.places import mends
-from lab.diagnosis.search import hypotheses, leading, tried
+from lab.diagnosis.screening import hypotheses
+from lab.diagnosis.search import leading, tried
 from lab.effects.effect import Effect
 
 

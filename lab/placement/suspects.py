@@ -10,9 +10,10 @@ import numpy as np
 from identification.information import planned
 from identification.recording import Array, Channel
 from lab.diagnosis.calibrate import parameters_of, survey_of
+from lab.diagnosis.changes import OWN_PARAMETERS
 from lab.diagnosis.fit import POOL, theta_slopes
 from lab.diagnosis.misfit import Hypothesis, Misfit
-from lab.diagnosis.search import OWN_PARAMETERS, hypotheses
+from lab.diagnosis.screening import hypotheses
 from lab.effects import EFFECTS
 from lab.errors import LabError, UnknownNameError
 from lab.placement.plan import Plan

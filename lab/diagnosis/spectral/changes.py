@@ -9,12 +9,13 @@ from typing import Any
 import numpy as np
 
 from identification.recording import Array
+from lab.diagnosis.candidate import Candidate
 from lab.diagnosis.changes import DAMPING_FACTORS, FACTORS, WORTH, directions
 from lab.diagnosis.evidence import minus_two_log_evidence
-from lab.diagnosis.search import Candidate, wrong_parameters
 from lab.diagnosis.spectral.fit import SpectralFit, fit, point
 from lab.diagnosis.spectral.lifting import is_free, let_go
 from lab.diagnosis.spectral.likelihood import Likelihood
+from lab.diagnosis.tolerance import wrong_parameters
 from lab.effects.effect import Effect
 
 CONFIRMED, FOLLOWED = 3, 4

@@ -12,6 +12,7 @@ import numpy as np
 from identification.recording import Recording
 from identification.response import FrequencyResponse
 from lab.diagnosis.calibrate import Calibration, parameters_of
+from lab.diagnosis.candidate import Candidate
 from lab.diagnosis.diagnose import State, calibrated_rig, calibration_of, effects_of
 from lab.diagnosis.misfit import Parameters
 from lab.diagnosis.outcome import (
@@ -24,7 +25,6 @@ from lab.diagnosis.outcome import (
     Finding,
     Quantity,
 )
-from lab.diagnosis.search import Candidate
 from lab.diagnosis.spectral.experiment import Experiment
 from lab.diagnosis.spectral.fit import SpectralFit, fit
 from lab.diagnosis.spectral.recorded import Recorded

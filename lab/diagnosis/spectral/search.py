@@ -9,11 +9,12 @@ from typing import Any
 import numpy as np
 
 from identification.recording import Array
+from lab.diagnosis.candidate import Candidate
 from lab.diagnosis.evidence import minus_two_log_evidence
 from lab.diagnosis.fit import POOL
 from lab.diagnosis.misfit import Hypothesis
 from lab.diagnosis.plausible import plausible
-from lab.diagnosis.search import Candidate, hypotheses
+from lab.diagnosis.screening import hypotheses
 from lab.diagnosis.spectral.changes import changes
 from lab.diagnosis.spectral.fit import Point, SpectralFit, fit, point, slopes, system, whitened_error
 from lab.diagnosis.spectral.likelihood import Likelihood

@@ -9,8 +9,9 @@ from typing import NamedTuple
 import numpy as np
 
 from identification.recording import Array
+from lab.diagnosis.changes import OWN_PARAMETERS
 from lab.diagnosis.evidence import minus_two_log_evidence
-from lab.diagnosis.search import OWN_PARAMETERS, hypotheses
+from lab.diagnosis.screening import hypotheses
 from lab.diagnosis.spectral.fit import SpectralFit, fit, point, slopes
 from lab.diagnosis.spectral.lifting import let_go
 from lab.diagnosis.spectral.likelihood import Likelihood

@@ -7,8 +7,8 @@ from typing import Any
 
 import numpy as np
 
+from lab.diagnosis.candidate import Candidate
 from lab.diagnosis.evidence import minus_two_log_evidence
-from lab.diagnosis.search import Candidate
 from lab.diagnosis.spectral.experiment import Experiment
 from lab.diagnosis.spectral.fit import SpectralFit, fit
 from lab.diagnosis.spectral.lifting import let_go

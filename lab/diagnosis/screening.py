@@ -1,0 +1,142 @@
+"""Screening: every cause at every place, tried cheaply, and what the luckiest would have gained from noise."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from identification.recording import Array
+from lab.diagnosis.chance import NO_CHANCE, Chance
+from lab.diagnosis.fit import POOL, cause_slopes, moved_by, objective, theta_slopes, weights
+from lab.diagnosis.misfit import Hypothesis, Misfit
+from lab.diagnosis.places import tone
+from lab.effects.effect import Effect
+
+SCREEN_SAMPLES = 4096
+SCREEN_SUBSTEPS = 3
+"""Enough to rank causes by, where nothing else in the model has a law."""
+STEPPED_ON = 40
+"""Hypotheses that get more than one step in the screening."""
+
+_Start = tuple[Hypothesis, Array, Array, Array, float, float]
+"""A hypothesis, its residual, what is left of it with the model's parameters projected out, these, objective, damping."""
+
+
+@dataclass(frozen=True, eq=False)
+class Screened:
+    """Score of one hypothesis after a few steps with the model's parameters projected out."""
+
+    hypothesis: Hypothesis
+    score: float
+
+
+def hypotheses(misfit: Misfit, effects: Mapping[str, type[Effect]]) -> list[Hypothesis]:
+    """Every cause at every place from every starting value."""
+    survey = misfit.survey
+    assert survey is not None
+    return [
+        Hypothesis.starting(kind, location, guess)
+        for kind in effects.values()
+        for location in kind.places(survey.rig)
+        for guess in kind.guesses(survey, location)
+        # A place that the test does not move has no scale.
+        if all(0 < abs(scale) < np.inf for scale in guess.scale.values())
+    ]
+
+
+def screen(
+    misfit: Misfit,
+    theta: Array,
+    present: Sequence[Hypothesis],
+    observer: Array,
+    proposed: Sequence[Hypothesis],
+) -> tuple[list[Screened], Array]:
+    """Hypotheses by falling score: the likelihood gained in a few steps, less the price of their variables.
+
+    Beside them, the best score that each of many draws of mere noise would have given.
+    """
+    n_train = tuple(min(n, SCREEN_SAMPLES) for n in misfit.n_train)
+    if not misfit.plant(theta, present).laws:
+        misfit = replace(misfit, substeps=SCREEN_SUBSTEPS)
+    e = misfit.residual(theta, present, observer=observer, n_train=n_train)
+    slopes = np.concatenate(
+        [
+            theta_slopes(misfit, theta, present, observer, e, n_train),
+            cause_slopes(misfit, theta, present, observer, e, n_train),
+        ]
+    )
+    P = misfit.parameters.precision
+    colour = misfit.colour
+    base = objective(e, theta, P, colour)
+    w = weights(e, colour)
+    J = (slopes * w[:, None]).reshape(slopes.shape[0], -1)
+    n, size = theta.size, len(slopes)
+    prior = np.zeros((size, size))
+    prior[:n, :n] = P
+    H = np.linalg.pinv(J @ J.T + prior, rcond=1e-13, hermitian=True)
+    chance = Chance(e.shape, sum(misfit.n_train) * len(e))
+
+    def projected(r: Array) -> tuple[Array, Array, float]:
+        """Residual less what the model's parameters can explain of it, the parameters then, and the objective."""
+        d = -H @ (J @ (r * w[:, None]).ravel() + prior[:, :n] @ theta)
+        left = r + np.tensordot(d, slopes, axes=1)
+        return left, theta + d[:n], objective(left, theta + d[:n], P, colour)
+
+    def own_slopes(h: Hypothesis, r: Array) -> tuple[Array, Array]:
+        """Slopes of the residual by a hypothesis' own variables, the model's parameters following, and slopes of these."""
+        own = cause_slopes(misfit, theta, [*present, h], observer, r, n_train)[-h.n :]
+        follow = np.array([-H @ (J @ (x * w[:, None]).ravel()) for x in own])
+        return own + np.tensordot(follow, slopes, axes=1), follow[:, :n]
+
+    def stepped(started: _Start, own: Array, follow: Array) -> _Start:
+        """A start after a Gauss-Newton step on its own variables; itself where none helps."""
+        h, _, left, parameters, f, damping = started
+        v = weights(left, colour)
+        A = (own * v[:, None]).reshape(h.n, -1)
+        # What a cause explains, the parameters need not: the prior is relieved.
+        G = A @ A.T + follow @ P @ follow.T
+        g = A @ (left * v[:, None]).ravel() + follow @ P @ parameters
+        if not (np.all(np.isfinite(G)) and np.trace(G) > 0):
+            return started
+        for _ in range(4):
+            step = -np.linalg.solve(G + (damping * np.diag(np.diag(G)) + 1e-9 * np.trace(G) * np.eye(h.n)), g)
+            (trial,) = moved_by([h], step)
+            trial_r = misfit.residual(theta, [*present, trial], observer=observer, n_train=n_train)
+            trial_left, trial_parameters, trial_f = projected(trial_r)
+            if trial_f < f:
+                return trial, trial_r, trial_left, trial_parameters, trial_f, damping / 5
+            damping = max(damping, 1e-2) * 10
+        return started
+
+    def score(started: _Start) -> float:
+        h, f = started[0], started[4]
+        found = base - f - max(h.n, 1) * float(np.log(e.size))
+        return found if np.isfinite(found) else -np.inf
+
+    def looked_at(h: Hypothesis) -> tuple[_Start, Array]:
+        """A hypothesis after one step, and what it would have gained from noise."""
+        r = misfit.residual(theta, [*present, h], observer=observer, n_train=n_train)
+        started: _Start = (h, r, *projected(r), 1e-2)
+        if not (h.n and np.isfinite(started[4])):
+            return started, NO_CHANCE
+        own, follow = own_slopes(h, r)
+        lucky = chance.tones if tone(h) is not None else chance.gains(own * w[:, None])
+        return stepped(started, own, follow), lucky
+
+    def followed(started: _Start) -> _Start:
+        """A start after a few steps more."""
+        for _ in range(3 if started[0].n and np.isfinite(started[4]) else 0):
+            before = started[4]
+            started = stepped(started, *own_slopes(started[0], started[1]))
+            if before - started[4] < 1:
+                break
+        return started
+
+    looks = list(POOL.map(looked_at, proposed))
+    lucky = np.max([each for _, each in looks], axis=0, initial=-np.inf)
+    first = sorted((started for started, _ in looks), key=lambda started: -score(started))
+    again = list(POOL.map(followed, first[:STEPPED_ON]))
+    rows = [Screened(started[0], score(started)) for started in again + first[STEPPED_ON:]]
+    return sorted(rows, key=lambda row: -row.score), lucky
