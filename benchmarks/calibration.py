@@ -18,7 +18,7 @@ import numpy as np
 
 from identification.recording import Recording
 from lab.diagnosis.calibrate import calibrate, parameters_of
-from lab.diagnosis.diagnose import calibrated_rig
+from lab.diagnosis.conclude import calibrated_rig
 from lab.diagnosis.fit import fit
 from lab.diagnosis.misfit import Misfit
 from lab.excitation import Random

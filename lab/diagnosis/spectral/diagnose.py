@@ -13,7 +13,7 @@ from identification.recording import Recording
 from identification.response import FrequencyResponse
 from lab.diagnosis.calibrate import Calibration, parameters_of
 from lab.diagnosis.candidate import Candidate
-from lab.diagnosis.diagnose import State, calibrated_rig, calibration_of, effects_of
+from lab.diagnosis.conclude import calibrated_rig, calibration_of, effects_of
 from lab.diagnosis.misfit import Parameters
 from lab.diagnosis.outcome import (
     CONSISTENT,
@@ -33,6 +33,7 @@ from lab.diagnosis.spectral.search import drifting, search
 from lab.diagnosis.spectral.smallest import in_words, smallest_changes, smallest_drifts
 from lab.diagnosis.spectral.stage import Stage, confirmed, predicted, settled, with_cause, without_idle
 from lab.diagnosis.spectral.tones import FoundTone
+from lab.diagnosis.state import State
 from lab.diagnosis.words import advice, says
 from lab.effects import EFFECTS
 from lab.effects.effect import Effect

@@ -1,0 +1,200 @@
+"""Conclude: what a diagnosis tells of the causes that it found."""
+
+from __future__ import annotations
+
+import itertools
+from collections.abc import Sequence
+
+import numpy as np
+
+from identification.recording import Array, Recording
+from lab.diagnosis import words
+from lab.diagnosis.baseline import Baseline
+from lab.diagnosis.candidate import Candidate
+from lab.diagnosis.check import check
+from lab.diagnosis.gain import errors_of, held_out, noise_floor, predictions_of
+from lab.diagnosis.misfit import Misfit
+from lab.diagnosis.noise import noise_of
+from lab.diagnosis.outcome import (
+    CONSISTENT,
+    EXPLAINED,
+    UNEXPLAINED,
+    Alternative,
+    Calibrated,
+    Diagnosis,
+    Finding,
+    Quantity,
+)
+from lab.diagnosis.starts import best_starts, starts_of
+from lab.diagnosis.state import State
+from lab.diagnosis.unlearnable import unlearnable
+from lab.diagnosis.whiteness import Whiteness
+from lab.effects.damping_change import DampingChange
+from lab.effects.edits import law_of, with_law, with_mass
+from lab.effects.effect import EVERYWHERE, Effect
+from lab.effects.mass_change import MassChange
+from lab.effects.stiffness_change import StiffnessChange
+from lab.rig import Rig
+
+
+def effects_of(state: State) -> list[tuple[Candidate, Effect, dict[str, Quantity]]]:
+    """The accepted causes at their fitted size, with error bars."""
+    found, used = [], 0
+    covariance, n = state.fit.covariance, state.fit.theta.size
+    offset = n
+    for candidate in state.accepted:
+        if candidate.direction is not None:
+            found.append((candidate, *_own_change(state, candidate, covariance)))
+            continue
+        cause = state.fit.causes[used]
+        used += 1
+        slopes = []
+        for j in range(cause.n):
+            step = np.zeros(cause.n)
+            step[j] = 1e-4
+            up, down = (
+                cause.at(cause.values + step).effect.parameters,
+                cause.at(cause.values - step).effect.parameters,
+            )
+            slopes.append([(up[name] - down[name]) / 2e-4 for name in up])
+        J = np.array(slopes).reshape(cause.n, len(cause.effect.parameters))
+        own = covariance[offset : offset + cause.n, offset : offset + cause.n]
+        stds = np.sqrt(np.maximum(np.einsum("ja,jk,ka->a", J, own, J), 0.0))
+        effect = cause.effect
+        quantities = {
+            name: Quantity(float(value), float(std), effect.units[name])
+            for (name, value), std in zip(effect.parameters.items(), stds, strict=True)
+        }
+        offset += cause.n
+        found.append((candidate, effect, quantities))
+    return found
+
+
+def _own_change(state: State, candidate: Candidate, covariance: Array) -> tuple[Effect, dict[str, Quantity]]:
+    """A mass, stiffness or damping that left its tolerance, as an effect."""
+    assert candidate.direction is not None
+    parameters, theta = state.misfit.parameters, state.fit.theta
+    members = np.flatnonzero(candidate.direction)
+    logs = theta[members] * parameters.widths[members]
+    weights = np.full(members.size, 1 / members.size)
+    change = float(np.expm1(weights @ logs))
+    scale = weights * parameters.widths[members]
+    # What changed is known no better than what it was before: its tolerance belongs to the error bar.
+    tolerance = float(np.sqrt(np.sum(scale**2)))
+    fitted = float(np.sqrt(scale @ covariance[np.ix_(members, members)] @ scale))
+    std = (1 + change) * float(np.hypot(fitted, tolerance))
+    if candidate.cause == "mass_change" and candidate.location != EVERYWHERE:
+        mass = float(state.misfit.twin.body_mass[members[0]])
+        effect: Effect = MassChange(candidate.location, delta_mass=mass * change)
+        return effect, {"delta_mass": Quantity(mass * change, mass * std, "kg")}
+    kinds = {"mass_change": MassChange, "stiffness_change": StiffnessChange, "damping_change": DampingChange}
+    effect = kinds[candidate.cause](candidate.location, relative_change=change)
+    return effect, {"relative_change": Quantity(change, std, "1")}
+
+
+def conclude(
+    state: State,
+    recording: Recording,
+    nominal: Rig,
+    rig: Rig,
+    first: Sequence[Candidate],
+    left: Whiteness,
+    known: Baseline | None,
+) -> Diagnosis:
+    """What a diagnosis tells: findings with their sizes, alternatives, the extended model, and the gain on data kept aside.
+
+    Args:
+        state: with all causes.
+        recording: measured.
+        nominal: rig as the engineer believes it.
+        rig: what was calibrated: the nominal one, or what a baseline made of it.
+        first: candidates of the first search.
+        left: whether what remains is noise.
+        known: what the baseline taught.
+    """
+    causes = effects_of(state)
+    calibrated = calibrated_rig(state.misfit, state.origin.theta, rig)
+    extended = calibrated_rig(state.misfit, state.fit.theta, rig)
+    for candidate, effect, _ in causes:
+        if candidate.direction is None:
+            extended = effect.apply(extended)
+    misfit = state.misfit
+    floor = noise_floor(state.fit.residual, held_out(misfit))
+    starts = [best_starts(misfit), starts_of(misfit, state.origin.theta), starts_of(misfit, state.fit.theta)]
+    predictions = predictions_of(
+        recording, misfit, (nominal, calibrated, extended), starts, accuracy=max(0.2 * floor, 1e-6)
+    )
+    shares = _shares(state, floor)
+    findings = [
+        Finding(effect, quantities, 0.5 * candidate.gain, share, words.says(effect, quantities))
+        for (candidate, effect, quantities), share in zip(causes, shares, strict=True)
+    ]
+    verdict, warnings = (EXPLAINED if findings else CONSISTENT), []
+    if not left.passed and known is not None and known.covers(state.misfit, state.fit):
+        warnings.append(words.as_in_the_baseline(known.power, recording))
+    elif not left.passed:
+        verdict = UNEXPLAINED
+        warnings.append(words.left_over(left, recording))
+    alternatives = _alternatives(first) if findings else ()
+    warnings += words.inseparable(alternatives)
+    return Diagnosis(
+        verdict,
+        tuple(sorted(findings, key=lambda f: -f.holdout_gain)),
+        alternatives,
+        calibration_of(state),
+        errors_of(predictions, floor),
+        predictions,
+        nominal,
+        extended,
+        tuple(warnings),
+        noise=noise_of(state.fit.residual, recording),
+        unlearnable=(*check(recording, nominal), *unlearnable(state.misfit, state.fit)),
+    )
+
+
+def _shares(state: State, floor: float) -> list[float]:
+    """Share of the calibrated model's excess error on data kept aside that each cause removed, 0 to 1."""
+    errors = state.held_out
+    excess = max(errors[0] - floor, 1e-12)
+    return [float(np.clip((a - b) / excess, 0.0, 1.0)) for a, b in itertools.pairwise(errors)]
+
+
+def _alternatives(first: Sequence[Candidate]) -> tuple[Alternative, ...]:
+    """The next best explanations of the first finding."""
+    told = first[0]
+    return tuple(
+        Alternative(
+            c.cause, c.location, 0.5 * c.gain, words.advice(told.cause, c.cause, 0.5 * (told.gain - c.gain))
+        )
+        for c in first[1:6]
+        if c.gain > 0
+    )
+
+
+def calibration_of(state: State) -> dict[str, Calibrated]:
+    """Nominal and calibrated value of every parameter of the model, with the causes in it."""
+    misfit, n = state.misfit, state.misfit.parameters.n_factors
+    model = misfit.twin
+    nominal = np.concatenate([model.body_mass, model.stiffness, model.damping])
+    widths = misfit.parameters.widths[:n]
+    factors = np.exp(state.fit.theta[:n] * widths)
+    stds = nominal * factors * widths * np.sqrt(np.diag(state.fit.covariance)[:n])
+    rows = zip(misfit.parameters.names[:n], nominal, nominal * factors, stds, strict=True)
+    return {name: Calibrated(float(a), float(b), float(c)) for name, a, b, c in rows}
+
+
+def calibrated_rig(misfit: Misfit, theta: Array, rig: Rig) -> Rig:
+    """The rig with its masses, stiffnesses and dampings at the parameters `theta`."""
+    mass, stiffness, damping = misfit.parameters.factors(theta)
+    original = rig
+    for body, factor in zip(misfit.twin.bodies, mass, strict=True):
+        rig = with_mass(rig, body, float(factor))
+    for name, k, c in zip(misfit.twin.springs, stiffness, damping, strict=True):
+        elastic, viscous = law_of(original, original.spring(name))
+        rig = with_law(
+            rig,
+            name,
+            stiffness=[float(k) * elastic[0], *elastic[1:]],
+            damping=[float(c) * viscous[0], *viscous[1:]],
+        )
+    return rig
