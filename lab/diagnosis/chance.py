@@ -62,13 +62,16 @@ def quantile(best: Array, own: int) -> float:
     all, which is estimated with it (Student's t; Bonferroni).
 
     Args:
-        best: gain of the luckiest cause in each draw, (n_draws,).
+        best: gain of the luckiest cause in each draw, (n_draws,); -inf where no cause was looked at.
         own: number of the model's own parameters.
     """
-    scale = np.std(best, ddof=1) * np.sqrt(6) / np.pi
-    of_causes = np.mean(best) - scale * (np.euler_gamma + np.log(-np.log1p(-LEVEL)))
-    if own < 2:
+    of_causes = 0.0
+    if np.all(np.isfinite(best)):
+        scale = np.std(best, ddof=1) * np.sqrt(6) / np.pi
+        of_causes = np.mean(best) - scale * (np.euler_gamma + np.log(-np.log1p(-LEVEL)))
+    if own < 1:
         return float(max(of_causes, 0.0))
-    # The likelihood ratio of one outlier among n normal numbers whose spread is unknown is n log(1 + t² / (n - 1)).
-    t_squared = scipy.stats.f.isf(LEVEL / own, 1, own - 1)
-    return float(max(of_causes, own * np.log1p(t_squared / (own - 1)), 0.0))
+    # The likelihood ratio of one outlier among n + 1 normal numbers whose spread is unknown is (n + 1) log(1 + t² / n). What is
+    # believed of the spread beforehand, a factor of two either way, counts as about one of them.
+    t_squared = scipy.stats.f.isf(LEVEL / own, 1, own)
+    return float(max(of_causes, (own + 1) * np.log1p(t_squared / own), 0.0))

@@ -135,7 +135,7 @@ def screen(
         return started
 
     looks = list(POOL.map(looked_at, proposed))
-    lucky = np.max([each for _, each in looks], axis=0, initial=-np.inf)
+    lucky = np.max([NO_CHANCE, *(each for _, each in looks)], axis=0)
     first = sorted((started for started, _ in looks), key=lambda started: -score(started))
     again = list(POOL.map(followed, first[:STEPPED_ON]))
     rows = [Screened(started[0], score(started)) for started in again + first[STEPPED_ON:]]

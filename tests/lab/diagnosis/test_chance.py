@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from lab.diagnosis.chance import DRAWS, LEVEL, Chance, quantile
+from lab.diagnosis.chance import DRAWS, LEVEL, NO_CHANCE, Chance, quantile
 
 N_OUTPUTS, N = 2, 2000
 N_TOTAL = 5000
@@ -53,15 +53,16 @@ def test_quantile_of_many_independent_looks():
 
 
 def test_an_outlier_among_the_parameters():
-    # Among n normal numbers, the gain from setting the farthest free, the spread profiled out in both cases.
+    # Among n normal numbers beside one that is known to be right, the gain from setting the farthest free.
     n, rng = 12, np.random.default_rng(3)
-    z = rng.standard_normal((200_000, n))
+    z = rng.standard_normal((200_000, n + 1))
     squares = np.sum(z**2, axis=1)
-    gains = n * np.log(squares / (squares - np.max(z**2, axis=1)))
+    gains = (n + 1) * np.log(squares / (squares - np.max(z[:, :n] ** 2, axis=1)))
     threshold = quantile(np.full(DRAWS, -50.0), n)
     # 200 of 200 000 are expected at most: Bonferroni errs on the safe side, here by little.
     assert 140 < np.sum(gains > threshold) < 200 + 4 * np.sqrt(200)
 
 
 def test_never_below_even_odds():
-    assert quantile(np.full(DRAWS, -50.0), 1) == 0.0
+    assert quantile(np.full(DRAWS, -50.0), 0) == 0.0
+    assert quantile(NO_CHANCE, 0) == 0.0
