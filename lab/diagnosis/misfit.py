@@ -8,6 +8,7 @@ from functools import cached_property
 from typing import Any
 
 import numpy as np
+import scipy.linalg
 
 from identification.recording import Array, Record, Recording
 from lab.effects.effect import Effect
@@ -133,11 +134,26 @@ class Parameters:
         """Numbers of all masses, stiffnesses or dampings."""
         return [i for i, each in enumerate(self.names) if each.partition(" ")[0] == name]
 
-    def lifted(self, direction: Array) -> Parameters:
-        """The parameters with their prior out of the way along a direction."""
+    @property
+    def free(self) -> Array:
+        """Orthonormal directions without a prior, as columns (n, n_free)."""
+        values, vectors = np.linalg.eigh(self.precision)
+        return np.asarray(vectors[:, values < 0.5])
+
+    def is_free(self, direction: Array) -> bool:
+        """Whether most of a direction (n,) has no prior any more."""
         v = direction / np.linalg.norm(direction)
-        held = np.eye(self.n) - np.outer(v, v)
-        return replace(self, precision=held @ self.precision @ held + LOOSE * np.outer(v, v))
+        return bool(np.linalg.norm(self.free.T @ v) > np.sqrt(0.5))
+
+    def lifted(self, *directions: Array) -> Parameters:
+        """The parameters without a prior along further directions (n,), and along all that were lifted before.
+
+        They need not be at right angles to one another: all that they span is free, as "this mass" and "all masses together"
+        ask for.
+        """
+        basis = scipy.linalg.orth(np.column_stack([self.free, *directions]))
+        free = basis @ basis.T
+        return replace(self, precision=np.eye(self.n) - free + LOOSE * free)
 
 
 LOOSE = 1e-6

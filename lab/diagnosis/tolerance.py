@@ -27,8 +27,6 @@ def wrong_parameters(
     assert misfit.survey is not None
     named = [(each.kind, each.location) for each in present.causes]
     found, eye = [], np.eye(misfit.parameters.n)
-    loose = np.linalg.eigh(misfit.parameters.precision)
-    loose_directions = loose[1][:, loose[0] < 0.5]
     for group, cause in OWN_PARAMETERS.items():
         members = misfit.parameters.group(group)
         proposals = [(misfit.parameters.names[j].partition(" ")[2], eye[j]) for j in members]
@@ -37,7 +35,7 @@ def wrong_parameters(
         for place, direction in proposals:
             v = direction / np.linalg.norm(direction)
             mending = cause in effects and mends(effects[cause], place, named, misfit.survey)
-            fresh = np.linalg.norm(v - loose_directions @ (loose_directions.T @ v)) > 0.5
+            fresh = not misfit.parameters.is_free(direction)
             if cause in effects and fresh and not mending and abs(v @ present.theta) > 0.5:
                 gain = without - minus_two_log_evidence(present, free=direction)
                 found.append(Candidate(cause, place, present, gain, direction))

@@ -13,7 +13,6 @@ from lab.diagnosis.candidate import Candidate
 from lab.diagnosis.changes import DAMPING_FACTORS, FACTORS, WORTH, directions
 from lab.diagnosis.evidence import minus_two_log_evidence
 from lab.diagnosis.spectral.fit import SpectralFit, fit, point
-from lab.diagnosis.spectral.lifting import is_free, let_go
 from lab.diagnosis.spectral.likelihood import Likelihood
 from lab.diagnosis.tolerance import wrong_parameters
 from lab.effects.effect import Effect
@@ -61,9 +60,9 @@ def _large(
     best: dict[tuple[str, str], tuple[float, Array, SpectralFit, Array]] = {}
     parameters = likelihood.parameters
     for cause, location, direction in directions(likelihood, effects):  # type: ignore[arg-type]
-        if is_free(parameters, direction):
+        if parameters.is_free(direction):
             continue
-        lifted: Any = replace(likelihood, parameters=let_go(parameters, direction))  # type: ignore[type-var]
+        lifted: Any = replace(likelihood, parameters=parameters.lifted(direction))  # type: ignore[type-var]
         for start in starts:
             for factor in DAMPING_FACTORS if cause == "damping_change" else FACTORS:
                 theta = start.theta + np.log(factor) * direction / parameters.widths
@@ -73,7 +72,7 @@ def _large(
     ranked = sorted(best.items(), key=lambda item: item[1][0])[:FOLLOWED]
     for (cause, location), (reached, theta, start, direction) in ranked:
         if reached < present.objective - WORTH:
-            changed = replace(likelihood, parameters=let_go(parameters, direction))  # type: ignore[type-var]
+            changed = replace(likelihood, parameters=parameters.lifted(direction))  # type: ignore[type-var]
             found: Any = fit(changed, theta, start.causes, start.nuisance)
             yield Candidate(cause, location, found, without - _cost(found), direction)
 
@@ -81,7 +80,7 @@ def _large(
 def _confirmed(likelihood: Likelihood, present: SpectralFit, c: Candidate, without: float) -> Candidate:
     """A change fitted with its prior lifted."""
     assert c.direction is not None
-    parameters = let_go(likelihood.parameters, *(d for d in (c.direction, c.beside) if d is not None))
+    parameters = likelihood.parameters.lifted(*(d for d in (c.direction, c.beside) if d is not None))
     if c.beside is not None:
         without = min(without, minus_two_log_evidence(present, free=c.beside))  # type: ignore[arg-type]
     changed = replace(likelihood, parameters=parameters)  # type: ignore[type-var]

@@ -13,7 +13,6 @@ from lab.diagnosis.changes import OWN_PARAMETERS
 from lab.diagnosis.evidence import minus_two_log_evidence
 from lab.diagnosis.screening import hypotheses
 from lab.diagnosis.spectral.fit import SpectralFit, fit, point, slopes
-from lab.diagnosis.spectral.lifting import let_go
 from lab.diagnosis.spectral.likelihood import Likelihood
 from lab.effects.effect import Effect
 
@@ -50,7 +49,7 @@ def smallest_changes(likelihood: Likelihood, found: SpectralFit, needed: float) 
     for group, cause in OWN_PARAMETERS.items():
         sizes = []
         for j in parameters.group(group):
-            free = let_go(parameters, np.eye(n)[j]).precision
+            free = parameters.lifted(np.eye(n)[j]).precision
 
             def gain(x: float, j: int = j, free: Array = free) -> float:
                 there = replace(_exact(found), theta=x * np.eye(n)[j], precision=free)

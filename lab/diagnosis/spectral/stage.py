@@ -11,7 +11,6 @@ from lab.diagnosis.candidate import Candidate
 from lab.diagnosis.evidence import minus_two_log_evidence
 from lab.diagnosis.spectral.experiment import Experiment
 from lab.diagnosis.spectral.fit import SpectralFit, fit
-from lab.diagnosis.spectral.lifting import let_go
 from lab.diagnosis.spectral.tones import FoundTone
 from lab.diagnosis.spectral.transfer import Complex
 
@@ -61,7 +60,7 @@ def with_cause(stage: Stage, chosen: Candidate | FoundTone) -> Stage:
         if chosen.cause == "stiffness_drift":
             likelihood = experiment.in_parts(likelihood)
         if chosen.direction is not None:
-            likelihood = replace(likelihood, parameters=let_go(likelihood.parameters, chosen.direction))
+            likelihood = replace(likelihood, parameters=likelihood.parameters.lifted(chosen.direction))
     refit = fit(likelihood, start.theta, start.causes, start.nuisance)
     likelihood = experiment.surveyed(likelihood, refit.nuisance)
     held_out = stage.held_out or (held_out_error(stage),)
@@ -118,7 +117,7 @@ def _without(stage: Stage, number: int) -> Stage | None:
     else:
         free = [c.direction for c in kept if isinstance(c, Candidate) and c.direction is not None]
         parameters = replace(likelihood.parameters, precision=np.eye(likelihood.parameters.n))
-        likelihood = replace(likelihood, parameters=let_go(parameters, *free))
+        likelihood = replace(likelihood, parameters=parameters.lifted(*free))
     found = fit(likelihood, stage.fit.theta, causes, stage.fit.nuisance)
     errors = (*stage.held_out[: number + 1], *stage.held_out[number + 2 :])
     less = replace(stage, likelihood=likelihood, fit=found, accepted=kept, held_out=errors)

@@ -11,7 +11,6 @@ from lab.diagnosis.outcome import CONSISTENT, EXPLAINED
 from lab.diagnosis.plausible import plausible
 from lab.diagnosis.spectral.diagnose import diagnose_spectra
 from lab.diagnosis.spectral.fit import fit
-from lab.diagnosis.spectral.lifting import free_directions, is_free, let_go
 from lab.diagnosis.spectral.responses import Responses
 from lab.diagnosis.spectral.search import candidate, refitted
 from lab.diagnosis.spectral.stage import Stage, settled, with_cause, without_idle
@@ -30,15 +29,15 @@ def rig():
 def test_directions_that_are_not_at_right_angles_are_let_go_together(rig):
     parameters = parameters_of(twin(rig))
     one, all_masses = np.eye(parameters.n)[5], np.where(np.arange(parameters.n) < 7, 1.0, 0.0)
-    free = let_go(let_go(parameters, one), all_masses)
+    free = parameters.lifted(one).lifted(all_masses)
     for mixed in (one, all_masses, 3 * one - all_masses):
         # Rounding only.
         assert mixed @ free.precision @ mixed == pytest.approx(LOOSE * (mixed @ mixed), rel=1e-6)
-        assert is_free(free, mixed)
-    assert free_directions(free).shape[1] == 2
+        assert free.is_free(mixed)
+    assert free.free.shape[1] == 2
     held = np.eye(parameters.n)[8]
     assert held @ free.precision @ held == pytest.approx(1.0)
-    assert not is_free(free, held)
+    assert not free.is_free(held)
 
 
 @pytest.mark.parametrize(
