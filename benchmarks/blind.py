@@ -6,7 +6,7 @@ appended to a file of JSON lines, and a run that was stopped goes on where it wa
 right, false alarms, parameters within two standard deviations and their median relative error, held-out gain, verdicts and
 seconds; then detection against the best possible test, what was said of every cause, and every answer that is not right.
 
-    python benchmarks/blind.py [--cases 24] [--seed 0] [--family singles sparse …] [--only CAUSE] [--withhold]
+    python benchmarks/blind.py [--cases 24] [--seed 0] [--family singles sparse …] [--only CAUSE] [--withhold] [--reload]
                                [--strength 1 0.3 0.1] [--masses 3] [--samples 2048] [--jobs 1] [--out blind.jsonl]
                                [--write DIR] [--table]
 """
@@ -18,6 +18,7 @@ import itertools
 import json
 import os
 import sys
+import tempfile
 import time
 from concurrent.futures import ProcessPoolExecutor
 from dataclasses import dataclass, replace
@@ -36,6 +37,7 @@ from benchmarks.blind_cases.table import tables
 from benchmarks.blind_cases.truth import Case
 from identification.errors import IdentificationError
 from lab.diagnosis.diagnose import diagnose
+from lab.diagnosis.outcome import Diagnosis
 from lab.effects import EFFECTS
 from lab.errors import LabError
 from lab.files.recording import save
@@ -53,6 +55,7 @@ class Trial:
     strength: float = 1.0
     masses: int | None = None
     samples: int | None = None
+    reload: bool = False
 
     @property
     def key(self) -> dict[str, Any]:
@@ -83,7 +86,19 @@ def answered(trial: Trial, write: Path | None = None) -> dict[str, Any]:
     except (LabError, IdentificationError, ArithmeticError, ValueError, AssertionError) as error:
         return {**trial.key, "error": f"{case!r}: {type(error).__name__}: {error}"}
     seconds = time.perf_counter() - start
-    return {**trial.key, **judged(case, diagnosis, withheld=trial.withheld), "seconds": seconds}
+    row = {**trial.key, **judged(case, diagnosis, withheld=trial.withheld), "seconds": seconds}
+    if trial.reload:
+        row["reloaded"] = reloaded(case, diagnosis)
+    return row
+
+
+def reloaded(case: Case, diagnosis: Diagnosis) -> str:
+    """What is said of the same recording by the extended model, written and read again; it should be consistent."""
+    with tempfile.TemporaryDirectory() as folder:
+        diagnosis.extended.save(Path(folder) / "extended.xml")
+        again = diagnose(case.recording, Rig.load(Path(folder) / "extended.xml"))
+    names = [f"{f.effect.cause}@{f.effect.location}" for f in again.findings]
+    return " ".join([again.verdict, *names])
 
 
 def written(case: Case, folder: Path) -> None:
@@ -116,9 +131,10 @@ def run(trials: list[Trial], path: Path, *, jobs: int, write: Path | None) -> No
         for number, row in enumerate(rows, start=1):
             file.write(json.dumps(row) + "\n")
             file.flush()
-            result = (
-                row.get("error")
-                or f"{'right' if row['place_right'] else 'WRONG'}  {said(row)}  {row['seconds']:.1f} s"
+            result = row.get(
+                "error"
+            ) or f"{'right' if row['place_right'] else 'WRONG'}  {said(row)}  {row['seconds']:.1f} s" + (
+                f"; extended: {row['reloaded']}" if "reloaded" in row else ""
             )
             names = "+".join(f"{c}@{p}" for c, p, _ in row.get("hidden", [])) or "nothing"
             print(
@@ -136,6 +152,7 @@ def main(arguments: list[str] | None = None) -> None:
     parser.add_argument("--family", nargs="+", choices=list(FAMILIES), default=list(FAMILIES))
     parser.add_argument("--only", help="hide this cause only")
     parser.add_argument("--withhold", action="store_true", help="take the hidden cause out of the catalogue")
+    parser.add_argument("--reload", action="store_true", help="diagnose again with the extended model")
     parser.add_argument("--strength", type=float, nargs="+", default=[1.0], help="times the usual sizes")
     parser.add_argument("--masses", type=int, help="of every network, instead of the family's own number")
     parser.add_argument("--samples", type=int, help="of every record, instead of the family's own number")
@@ -148,7 +165,16 @@ def main(arguments: list[str] | None = None) -> None:
     if not options.table:
         seeds = range(options.seed, options.seed + options.cases)
         trials = [
-            Trial(family, seed, options.only, options.withhold, strength, options.masses, options.samples)
+            Trial(
+                family,
+                seed,
+                options.only,
+                options.withhold,
+                strength,
+                options.masses,
+                options.samples,
+                options.reload,
+            )
             for seed, family, strength in itertools.product(seeds, options.family, options.strength)
         ]
         run(trials, options.out, jobs=options.jobs, write=options.write)
