@@ -17,9 +17,10 @@ from lab.plant import NO_OBSERVER
 STEP, KINKED_STEP, CAUSE_STEP = 1e-3, 3e-2, 1e-3
 """Difference steps: in widths of the prior, so small that valleys are followed, but wide enough to see past the jags that kinks
 make; and in units of a cause's scale."""
-EASED, LEAST = 30.0, 1e-8
+EASED, KINKED_EASED, LEAST = 30.0, 8.0, 1e-8
 """Damping falls by so much after a good step, and so far: along a valley where only the prior tells, such as all masses,
-stiffnesses and dampings against the gain of the only actuator, the curvature is that much less than across."""
+stiffnesses and dampings against the gain of the only actuator, the curvature is that much less than across.
+Jags ask for caution."""
 POOL = ThreadPoolExecutor(min(cpu_count() or 1, 8))
 
 
@@ -81,7 +82,7 @@ def theta_slopes(
     n_train: Sequence[int] | None,
 ) -> Array:
     """Derivative of the residual by every parameter, (n_parameters, n_outputs, n_total)."""
-    step = KINKED_STEP if any(law.kind in KINKED for law in misfit.plant(theta, causes).laws) else STEP
+    step = KINKED_STEP if _kinked(misfit, theta, causes) else STEP
 
     def slope(j: int) -> Array:
         moved = theta.copy()
@@ -100,20 +101,27 @@ def cause_slopes(
     n_train: Sequence[int] | None,
 ) -> Array:
     """Derivative of the residual by every variable of the causes, (n_variables, n_outputs, n_total)."""
+    kinked = _kinked(misfit, theta, causes)
     slopes = []
     for i, cause in enumerate(causes):
         for j, name in enumerate(cause.guess.scale):
-            # A delay jumps where it passes a whole sample: the smaller slope is the one that does not cross.
             sides = []
-            for step in (CAUSE_STEP, -CAUSE_STEP) if name == "delay" else (CAUSE_STEP,):
+            both = kinked or name == "delay"
+            for step in (CAUSE_STEP, -CAUSE_STEP) if both else (CAUSE_STEP,):
                 values = cause.values.copy()
                 values[j] += step
                 moved = [*causes[:i], cause.at(values), *causes[i + 1 :]]
                 sides.append(
                     (misfit.residual(theta, moved, observer=observer, n_train=n_train) - residual) / step
                 )
+            # A delay jumps where it passes a whole sample, and a kink makes jags: the smaller slope does not cross one.
             slopes.append(min(sides, key=lambda side: float(np.nan_to_num(np.sum(side**2), nan=np.inf))))
     return np.array(slopes).reshape(-1, *residual.shape)
+
+
+def _kinked(misfit: Misfit, theta: Array, causes: Sequence[Hypothesis]) -> bool:
+    """Whether a law with kinks is in the plant."""
+    return any(law.kind in KINKED for law in misfit.plant(theta, causes).laws)
 
 
 def moved_by(causes: Sequence[Hypothesis], step: Array) -> tuple[Hypothesis, ...]:
@@ -157,6 +165,7 @@ def fit(
     prior = np.zeros((size, size))
     prior[:n, :n] = P
     information = np.zeros((size, size))
+    eased = KINKED_EASED if _kinked(misfit, theta, causes) else EASED
     for _ in range(iterations):
         if age >= refresh:
             slopes, age = theta_slopes(misfit, theta, causes, observer, e, n_train), 0
@@ -194,7 +203,7 @@ def fit(
                 break
             age, damping = refresh, 1e-2
             continue
-        theta, causes, e, f, damping = trial, trial_causes, trial_e, trial_f, max(damping / EASED, LEAST)
+        theta, causes, e, f, damping = trial, trial_causes, trial_e, trial_f, max(damping / eased, LEAST)
         if step < tolerance:
             if fresh:
                 break
