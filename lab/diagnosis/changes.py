@@ -9,7 +9,7 @@ import numpy as np
 
 from identification.recording import Array
 from lab.diagnosis.fit import Fit, fit, objective
-from lab.diagnosis.misfit import Hypothesis, Misfit, Parameters
+from lab.diagnosis.misfit import Hypothesis, Misfit
 from lab.diagnosis.starts import best_starts
 from lab.effects.effect import EVERYWHERE, Effect
 from lab.effects.missing_spring import MissingSpring
@@ -48,19 +48,14 @@ def large_changes(
     slopes at the model's own value point nowhere.
     """
     tried = []
-    window = tuple(min(n, WINDOW) for n in misfit.n_train)
-
-    def level(theta: Array, parameters: Parameters) -> float:
-        e = misfit.residual(theta, present.causes, observer=present.observer, n_train=window)
-        return objective(e, theta, parameters.precision, misfit.colour)
-
-    reference = level(present.theta, misfit.parameters)
+    seen = _windowed(misfit)
+    reference = _level(seen, present, present.theta, present.causes)
     for cause, location, direction in directions(misfit, effects):
-        lifted = misfit.parameters.lifted(direction)
+        lifted = replace(seen, parameters=misfit.parameters.lifted(direction))
         for factor in DAMPING_FACTORS if cause == "damping_change" else FACTORS:
             theta = present.theta + np.log(factor) * direction / misfit.parameters.widths
-            theta = _restarted(replace(misfit, n_train=window), theta)
-            tried.append((level(theta, lifted), cause, location, direction, theta))
+            theta = _restarted(seen, theta)
+            tried.append((_level(lifted, present, theta, present.causes), cause, location, direction, theta))
     best: dict[tuple[str, str], tuple[float, str, str, Array, Array]] = {}
     for trial in sorted(tried, key=lambda trial: trial[0]):
         best.setdefault(trial[1:3], trial)
@@ -79,30 +74,34 @@ def stiff_springs(misfit: Misfit, present: Fit, proposed: Sequence[Hypothesis]) 
     Each is tried at a few stiffnesses, as a large change is, and followed from the best: beside the parameters as they are, and
     beside nominal ones, since without the spring these may have gone far to make up for it.
     """
-    window = tuple(min(n, WINDOW) for n in misfit.n_train)
-    P = misfit.parameters.precision
-    nominal = present.theta - P @ present.theta
-    followed = []
-    for theta in (present.theta, nominal):
-
-        def level(causes: Sequence[Hypothesis], theta: Array = theta) -> float:
-            e = misfit.residual(theta, causes, observer=present.observer, n_train=window)
-            return objective(e, theta, P, misfit.colour)
-
-        reference = level(present.causes) - WORTH
+    seen, followed = _windowed(misfit), []
+    for theta in (present.theta, present.theta - misfit.parameters.precision @ present.theta):
+        reference = _level(seen, present, theta, present.causes) - WORTH
         best = []
         for h in proposed:
             if h.kind is MissingSpring:
-                trials = [h.at(np.array([factor])) for factor in SPRING_FACTORS]
-                best.append(
-                    min(((level((*present.causes, t)), t) for t in trials), key=lambda trial: trial[0])
-                )
+                springs = [h.at(np.array([factor])) for factor in SPRING_FACTORS]
+                levels = [
+                    (_level(seen, present, theta, (*present.causes, spring)), spring) for spring in springs
+                ]
+                best.append(min(levels, key=lambda trial: trial[0]))
         best.sort(key=lambda trial: trial[0])
         followed += [(theta, h) for reached, h in best[: FOLLOWED // 2] if reached < reference]
     return [
         fit(misfit, theta, (*present.causes, h), observer=present.observer, iterations=15)
         for theta, h in followed
     ]
+
+
+def _windowed(misfit: Misfit) -> Misfit:
+    """The misfit on the beginning of every record."""
+    return replace(misfit, n_train=tuple(min(n, WINDOW) for n in misfit.n_train))
+
+
+def _level(misfit: Misfit, present: Fit, theta: Array, causes: Sequence[Hypothesis]) -> float:
+    """-2 log posterior of parameters and causes."""
+    e = misfit.residual(theta, causes, observer=present.observer)
+    return objective(e, theta, misfit.parameters.precision, misfit.colour)
 
 
 def _restarted(misfit: Misfit, theta: Array) -> Array:

@@ -9,7 +9,7 @@ from dataclasses import replace
 import numpy as np
 
 from lab.diagnosis.candidate import Candidate
-from lab.diagnosis.changes import OWN_PARAMETERS
+from lab.diagnosis.changes import directions
 from lab.diagnosis.evidence import minus_two_log_evidence
 from lab.diagnosis.fit import Fit, fit
 from lab.diagnosis.misfit import Misfit
@@ -26,19 +26,13 @@ def wrong_parameters(
     """Masses, stiffnesses and dampings of the model that leave their tolerance, one by one and all together."""
     assert misfit.survey is not None
     named = [(each.kind, each.location) for each in present.causes]
-    found, eye = [], np.eye(misfit.parameters.n)
-    for group, cause in OWN_PARAMETERS.items():
-        members = misfit.parameters.group(group)
-        proposals = [(misfit.parameters.names[j].partition(" ")[2], eye[j]) for j in members]
-        if len(members) > 1:
-            proposals.append((EVERYWHERE, eye[members].sum(axis=0)))
-        for place, direction in proposals:
-            v = direction / np.linalg.norm(direction)
-            mending = cause in effects and mends(effects[cause], place, named, misfit.survey)
-            fresh = not misfit.parameters.is_free(direction)
-            if cause in effects and fresh and not mending and abs(v @ present.theta) > 0.5:
-                gain = without - minus_two_log_evidence(present, free=direction)
-                found.append(Candidate(cause, place, present, gain, direction))
+    found = []
+    for cause, place, direction in directions(misfit, effects):
+        v = direction / np.linalg.norm(direction)
+        mending = mends(effects[cause], place, named, misfit.survey)
+        if not misfit.parameters.is_free(direction) and not mending and abs(v @ present.theta) > 0.5:
+            gain = without - minus_two_log_evidence(present, free=direction)
+            found.append(Candidate(cause, place, present, gain, direction))
     return _unmasked(found, without)
 
 
