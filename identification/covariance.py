@@ -153,14 +153,15 @@ def _add_cross_spectra(
     spectrum: NDArray[np.complex128], windows: Array, rows: NDArray[np.intp], step: int
 ) -> None:
     """Add Σ over segments of Y(f) R(f)ᴴ, shape (n_frequencies, n_outputs, n_references)."""
+    references = np.zeros((windows.shape[0], rows.size, min(SEGMENTS, windows.shape[1])))
     for first in range(0, windows.shape[1], SEGMENTS):
         part = windows[:, first : first + SEGMENTS]
-        references = np.zeros((*part.shape[:2], rows.size))
-        references[:step] = part[:step, :, rows]
+        own = references[:, :, : part.shape[1]]
+        own[:step] = part[:step, :, rows].transpose(0, 2, 1)
         # Frequencies first, as the products want them: a copy in another order would cost as much as they.
         Y = scipy.fft.rfft(part.transpose(0, 2, 1), axis=0)
-        R = scipy.fft.rfft(references, axis=0)
-        spectrum += Y @ np.conjugate(R, out=R)
+        R = scipy.fft.rfft(own, axis=0)
+        spectrum += Y @ np.conjugate(R, out=R).transpose(0, 2, 1)
 
 
 def _mean_part(total: Array, head: Array, tail: Array, rows: NDArray[np.intp], n_samples: int) -> Array:
