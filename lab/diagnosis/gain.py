@@ -7,7 +7,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from identification.recording import Array, Recording
-from lab.diagnosis.fit import Fit
+from lab.diagnosis.fit import POOL, Fit
 from lab.diagnosis.misfit import Misfit
 from lab.diagnosis.outcome import Errors, Prediction
 from lab.diagnosis.starts import start_of
@@ -36,14 +36,15 @@ def predictions_of(
         accuracy: of the simulation.
     """
     dofs = rigs[0].dofs
-    simulated = []
-    for rig, begins in zip(rigs, starts, strict=True):
+
+    def simulated(rig: Rig, begins: Sequence[Array | None]) -> list[Array]:
         motions = [None if start is None else start_of(rig, dofs, start) for start in begins]
-        simulated.append(replay(rig, recording, accuracy=accuracy, starts=motions))
+        return replay(rig, recording, accuracy=accuracy, starts=motions)
+
     return tuple(
         Prediction(measured, nominal, calibrated, extended, first)
         for (_, measured), nominal, calibrated, extended, first in zip(
-            misfit.records, *simulated, misfit.n_train, strict=True
+            misfit.records, *POOL.map(simulated, rigs, starts), misfit.n_train, strict=True
         )
     )
 
