@@ -17,7 +17,7 @@ from lab.diagnosis.fit import Fit, fit
 from lab.diagnosis.gain import held_out_error
 from lab.diagnosis.misfit import Misfit, Parameters
 from lab.diagnosis.outcome import Diagnosis
-from lab.diagnosis.revise import renamed, settled
+from lab.diagnosis.revise import renamed, restarted, settled
 from lab.diagnosis.search import search
 from lab.diagnosis.starts import free_decays, with_starts
 from lab.diagnosis.state import State
@@ -108,8 +108,8 @@ def diagnose(
         finely = _finely(further)
         covered = known is not None and known.covers(finely.misfit, finely.fit)
         after = whiteness(finely.fit.residual, inputs)
-        if len(further.accepted) > 1 and not after.passed:
-            further = _renamed(further, effects)
+        if not after.white:
+            further = _renamed(_restarted(further), effects)
             after = whiteness(_finely(further).fit.residual, inputs)
         if state.accepted and not covered and patches(left, after):
             break
@@ -186,8 +186,16 @@ def _settled(state: State, better: Fit, rig: Rig) -> State:
     return State(calibration, better, state.accepted, origin, held_out)
 
 
+def _restarted(state: State) -> State:
+    """The state with a better fit, if there is one from the model's own parameters."""
+    found = restarted(state.misfit, state.fit)
+    return replace(state, fit=found, calibration=replace(state.calibration, fit=found, guided=found))
+
+
 def _renamed(state: State, effects: Mapping[str, type[Effect]]) -> State:
     """The state with causes that were named while others were missing exchanged for better ones at their places."""
+    if len(state.accepted) < 2:
+        return state
     accepted, found = list(state.accepted), state.fit
     positions = [i for i, candidate in enumerate(accepted) if candidate.direction is None]
     for number, position in enumerate(positions):

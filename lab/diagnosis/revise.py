@@ -23,6 +23,16 @@ def settled(misfit: Misfit, present: Fit, further: Fit) -> Fit:
     return present if again is None else min(present, again, key=lambda f: f.objective)
 
 
+def restarted(misfit: Misfit, found: Fit) -> Fit:
+    """The fit, also tried from where only what has no prior is not as the model says.
+
+    While a cause is missing, the model's parameters are led astray by it, and behind kinks they may not find back.
+    """
+    free = misfit.parameters.free
+    again = tried(misfit, free @ (free.T @ found.theta), found.causes, found.observer, iterations=15)
+    return found if again is None else min(found, again, key=lambda f: f.objective)
+
+
 def renamed(misfit: Misfit, found: Fit, number: int, effects: Mapping[str, type[Effect]]) -> Fit:
     """The fit with one of its causes exchanged for another at its place, if that has more evidence; else the fit itself."""
     assert misfit.survey is not None

@@ -31,7 +31,8 @@ class Whiteness:
         lag: in samples.
         with_input: number of the input it correlates with; None for its own past.
         share: of the residual's power that its past and the inputs predict, in the channel where that is most.
-        left: information in what they predict, over all channels [nat per sample].
+        left: information in what they predict, twice, over all channels [nat per sample].
+        level: logarithm of the residual's mean square, summed over all channels.
     """
 
     largest: float
@@ -41,6 +42,7 @@ class Whiteness:
     with_input: int | None
     share: float
     left: float
+    level: float
 
     @property
     def white(self) -> bool:
@@ -57,9 +59,12 @@ def patches(before: Whiteness, after: Whiteness) -> bool:
     """Whether a cause only patches what it does not explain: most of what was left is left with it, too.
 
     A law that only resembles the one that was named leaves a little behind, of which any other cause takes a part; what causes
-    a residual takes nearly all of it.
+    a residual takes nearly all of it. What takes more than all that was known to be left is no patch, whatever shows behind it.
     """
-    return bool(not (before.white or after.white) and after.left > PATCHED * before.left)
+    taken = before.level - after.level
+    return bool(
+        not (before.white or after.white) and after.left > PATCHED * before.left and taken < before.left
+    )
 
 
 def whiteness(residual: Array, inputs: Array) -> Whiteness:
@@ -82,7 +87,11 @@ def whiteness(residual: Array, inputs: Array) -> Whiteness:
     limit = float(scipy.stats.norm.isf(LEVEL / (2 * max(tests, 1))))
     k, i = np.unravel_index(np.argmax(np.abs(own)), own.shape)
     shares = _predictable(e, u)
-    told = float(np.max(shares)), float(-np.sum(np.log1p(-np.clip(shares, 0.0, 1 - 1e-12))))
+    told = (
+        float(np.max(shares)),
+        float(-np.sum(np.log1p(-np.clip(shares, 0.0, 1 - 1e-12)))),
+        float(np.sum(np.log(np.maximum(np.mean(residual**2, axis=1), 1e-300)))),
+    )
     best = Whiteness(float(np.sqrt(n) * np.abs(own[k, i])), limit, int(i), int(k) + 1, None, *told)
     if cross.size:
         j, k, i = np.unravel_index(np.argmax(np.abs(cross)), cross.shape)

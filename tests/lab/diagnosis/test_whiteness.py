@@ -39,7 +39,7 @@ def test_what_an_input_explains_is_found():
 
 
 def test_little_is_passed_over():
-    small = Whiteness(9.0, 4.8, 0, 1, None, 0.5 * MATTERS, 0.03)
+    small = Whiteness(9.0, 4.8, 0, 1, None, 0.5 * MATTERS, 0.03, 0.0)
     assert small.passed
     assert not small.white
     assert not replace(small, share=2 * MATTERS).passed
@@ -48,19 +48,28 @@ def test_little_is_passed_over():
 @pytest.mark.parametrize(
     ("before", "after", "patched"),
     [
-        ((50.0, 0.76), (49.0, 0.75), True),  # hardly anything taken
-        ((50.0, 0.76), (20.0, 0.20), False),  # most of it
-        ((50.0, 0.76), (4.0, 0.01), False),  # all of it
-        ((8.0, 0.034), (5.5, 0.022), True),  # little was left, and most of that still is
+        ((50.0, 0.76, 0.0), (49.0, 0.75, -0.01), True),  # hardly anything taken
+        ((50.0, 0.76, 0.0), (20.0, 0.20, -1.2), False),  # most of it
+        ((50.0, 0.76, 0.0), (4.0, 0.01, -1.4), False),  # all of it
+        ((8.0, 0.034, 0.0), (5.5, 0.022, -0.01), True),  # little was left, and most of that still is
+        ((50.0, 0.62, 0.0), (40.0, 0.57, -6.5), False),  # behind all that was known to be left, more shows
         (
-            (4.0, 0.01),
-            (4.1, 0.01),
+            (4.0, 0.01, 0.0),
+            (4.1, 0.01, 0.0),
             False,
         ),  # nothing was left: a parameter out of tolerance, which residuals do not show
     ],
 )
 def test_patches(before, after, patched):
-    def told(largest, share):
-        return Whiteness(largest, 4.8, 0, 1, None, share, -np.log1p(-share))
+    def told(largest, share, level):
+        return Whiteness(largest, 4.8, 0, 1, None, share, -np.log1p(-share), level)
 
     assert patches(told(*before), told(*after)) is patched
+
+
+def test_level_is_that_of_the_power():
+    e = noise(3)
+    twice = whiteness(2 * e, np.zeros((0, e.shape[1])))
+    once = whiteness(e, np.zeros((0, e.shape[1])))
+    # Three channels of four times the power.
+    assert twice.level - once.level == pytest.approx(3 * np.log(4), rel=1e-12)
