@@ -15,7 +15,30 @@ from identification.pulse_scatter import residual_std
 from identification.recording import Array, Recording
 from identification.residual_scatter import DRAWS, scatter_of
 from identification.spectral_scatter import Bars, values_near
-from identification.systems import Realization
+from identification.systems import MarkovParameters, Realization, StateSpace
+
+
+def with_best_inputs(markov: MarkovParameters, system: StateSpace) -> StateSpace:
+    """The model with the B that leaves least of all lags.
+
+    A method that takes B from the first lags alone, as ERA/DC does, has the noise of those in it: what such a model
+    leaves is more than the noise, and modes that it makes too strong scatter too little.
+
+    Args:
+        markov: the responses that were realized.
+        system: model of them.
+
+    Returns:
+        The same poles and shapes.
+
+    Source: Ljung (1999), System Identification, 2nd ed., section 10.6: with A and C known, the responses are linear in B.
+    """
+    seen = np.empty((markov.n_lags - 1, *system.C.shape))  # C Aᵏ
+    rows = system.C
+    for k in range(len(seen)):
+        seen[k], rows = rows, rows @ system.A
+    Y = markov.values[1:].reshape(-1, len(markov.inputs))
+    return replace(system, B=np.linalg.lstsq(seen.reshape(-1, system.n_states), Y)[0])
 
 
 def markov_scatter(
@@ -38,7 +61,8 @@ def markov_scatter(
 
     Source: parametric bootstrap, Efron and Tibshirani (1993), section 6.5.
     """
-    markov, system = markov_parameters(recording), realization.system
+    markov = markov_parameters(recording)
+    system = with_best_inputs(markov, realization.system)
     std, clean = residual_std(markov, system), system.markov(markov.n_lags).values
     method = MARKOV_METHODS[realization.method]
     known = inspect.signature(method).parameters

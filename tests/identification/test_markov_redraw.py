@@ -2,13 +2,19 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
+from benchmarks.error_bars import Case, calibrate
+from identification.era import era_dc
 from identification.identify import identify
 from identification.markov_methods import MARKOV_METHODS
-from identification.markov_redraw import markov_scatter
+from identification.markov_redraw import markov_scatter, with_best_inputs
 from identification.methods import METHODS
+from identification.pulse import markov_parameters
+from identification.pulse_scatter import residual_std
 from identification.residual_scatter import DRAWS
 from tests.systems import paper_chain3, pulse_recording, with_noise
 
@@ -66,3 +72,35 @@ def test_a_mode_is_read_at_the_order_where_it_stands():
     low, high = (np.array(markov_scatter(recording, found, [(order, pole)])[:2]) for order in (6, 8))
     assert np.all(np.isfinite(low))
     assert not np.array_equal(low, high)
+
+
+def test_the_best_inputs_are_those_of_the_model_when_data_are_its_own():
+    system = paper_chain3()
+    markov = system.markov(100)
+    wrong = replace(system, B=2 * system.B[:, ::-1])
+    np.testing.assert_allclose(with_best_inputs(markov, wrong).B, system.B, atol=1e-10)
+
+
+def test_what_a_correlated_realization_leaves_is_the_noise():
+    clean = pulse_recording(paper_chain3(), 400)
+    measured = markov_parameters(with_noise(clean, 0.05, 1))
+    noise = np.sqrt(np.mean((measured.values - markov_parameters(clean).values) ** 2, axis=0))
+    system = era_dc(measured, 6).system
+    found = residual_std(measured, with_best_inputs(measured, system))
+    # The model itself, B from its first lags, leaves up to twice the noise. Errors of the shapes remain, and the fit of
+    # 12 numbers in each response to 400 lags makes 1.5 %.
+    np.testing.assert_allclose(found, noise, rtol=0.06)
+    assert np.max(residual_std(measured, system) / noise) > 1.5
+
+
+def test_bars_of_a_correlated_realization_are_as_long_as_the_scatter_of_repeated_tests():
+    n, size = 16, {"n_rows": 15, "n_shifts": 3}
+    case = Case(lambda rng: pulses(0.04, rng), TRUTH, {"method": "era_dc", "order": 6, **size})
+    found = calibrate(case, n, seed=3)
+    assert found.n_tests == n
+    # A spread over n tests is known to 1/√(2 n), and what all bars share, their draws, tells a deviation to
+    # 1/√(2 · 24): three of both beyond the range of 0.8 to 1.25 that is asked for.
+    slack = 3 * np.hypot(1 / np.sqrt(2 * n), 1 / np.sqrt(2 * DRAWS))
+    assert np.all(np.abs(np.log(found.ratio)) < np.log(1.25) + slack)
+    # Six such figures together are known better: those of bars twice too wide lie beyond.
+    assert abs(np.mean(np.log(found.ratio))) < np.log(1.25)
