@@ -10,6 +10,7 @@ from identification.errors import IdentificationError
 from identification.found import Found
 from identification.modes import Modes
 from identification.observer_redraw import observer_scatter
+from identification.progress import UNHEARD, Work
 from identification.spectral_scatter import SPECTRAL, Bars, spectral_std
 from identification.systems import SecondOrder
 from identification.uncertainty import matrices_with_error_bars, modes_with_error_bars
@@ -19,13 +20,14 @@ TOLD = 0.5
 
 
 def error_bars(
-    found: Found, matrices: SecondOrder | None
+    found: Found, matrices: SecondOrder | None, *, work: Work = UNHEARD
 ) -> tuple[Modes, SecondOrder | None, tuple[str, ...]]:
     """Modes and matrices with their standard deviations, or the reasons why they have none.
 
     Args:
         found: modes and models.
         matrices: those found, or None; standard deviations that they have already stay.
+        work: told how much of this is done, where that is known.
 
     Returns:
         Modes, matrices, and sentences on their error bars.
@@ -36,7 +38,7 @@ def error_bars(
     if found.realization.method == "okid_era" and len(found.modes):  # one redraw of the noise serves both
         try:
             bars, with_bars = observer_scatter(
-                found.recording, found.realization, found.modes, matrices=wanting
+                found.recording, found.realization, found.modes, matrices=wanting, work=work
             )
         except IdentificationError as error:
             return found.modes, matrices, (f"Modes and matrices have no error bars: {error}.",)
@@ -44,7 +46,7 @@ def error_bars(
     modes = found.modes
     notes: list[str] = []
     try:
-        modes, shifts = _of_modes(found)
+        modes, shifts = _of_modes(found, work)
         notes += shifts
     except IdentificationError as error:
         notes.append(f"The modes have no error bars: {error}.")
@@ -56,7 +58,7 @@ def error_bars(
     return modes, matrices, tuple(notes)
 
 
-def _of_modes(found: Found) -> tuple[Modes, tuple[str, ...]]:
+def _of_modes(found: Found, work: Work) -> tuple[Modes, tuple[str, ...]]:
     """Modes with error bars, and what noise shifts in them."""
     given = found.settings
     if found.realization.method not in SPECTRAL:
@@ -65,7 +67,7 @@ def _of_modes(found: Found) -> tuple[Modes, tuple[str, ...]]:
         ), ()
     if not len(found.modes):
         return found.modes, ()
-    bars = spectral_std(found.recording, found.realization, found.tracks(), settings=given)
+    bars = spectral_std(found.recording, found.realization, found.tracks(), settings=given, work=work)
     return _with(found.modes, bars), told_shift(found.modes, bars)
 
 

@@ -17,6 +17,7 @@ from identification.markov_methods import MARKOV_METHODS
 from identification.methods import find_method
 from identification.modes import Modes
 from identification.output_only import horizon_warning
+from identification.progress import Progress, Work
 from identification.recording import Recording
 from identification.refinement import Refinement, refinement
 from identification.settled import NESTED, brief_warnings, settle
@@ -24,6 +25,8 @@ from identification.stability import Stabilization, stabilize
 from identification.systems import Realization, SecondOrder
 from identification.uncertainty import Placed
 
+REDRAWS = 12.0
+"""Cost of error bars, in that of the estimates, as measured with `okid_era`."""
 HANKEL = (*NESTED, *(name for name in MARKOV_METHODS if name != "era_dc"))
 """Methods whose horizon is the block rows and columns of one Hankel matrix."""
 
@@ -64,6 +67,7 @@ def identify(
     dofs: Sequence[str] | None = None,
     uncertainty: bool = True,
     refine: bool = False,
+    progress: Progress | None = None,
     **settings: Any,
 ) -> Identification:
     """Modes of the structure behind a recording, and M, C and K where its channels allow.
@@ -78,6 +82,7 @@ def identify(
             again as the estimates.
         refine: whether to move modes and matrices to the maximum of the likelihood, whatever method they come from;
             only with measured forces, or free decays. Their standard deviations are then those of the likelihood.
+        progress: told what is being done, and how much of it is done.
         **settings: further settings of the method.
 
     Returns:
@@ -92,6 +97,8 @@ def identify(
     recording.require_complete()
     name, reason = (method, "as asked for") if method is not None else choose_method(recording)
     chosen = find_method(name)
+    realizing, barring = Work(progress).parts(1.0, REDRAWS)
+    realizing.called("identifying")
     realization = chosen(recording, order, **settings)
     notes = (f"The method is {name}, {reason}.", *realization.notes)
     stabilization = stabilize(realization) if len(realization.systems) > 1 else None
@@ -110,6 +117,7 @@ def identify(
         stable = (True,) * len(modes)
         realization, note = _lowest_complete(realization, stabilization)
         notes += note
+    barring = barring.called("refining" if refine else "finding error bars")
     found = Found(recording, realization, stabilization, modes, places, settings)
     matrices, verdict = matrices_of(found, dofs, uncertainty=uncertainty)
     refined, after, doubts = _refined(found, matrices) if refine else (None, (), ())
@@ -117,7 +125,7 @@ def identify(
         modes, matrices = refined.modes, refined.second_order
         stable = tuple(stable[k] for k in refined.partners)
     elif uncertainty:
-        modes, matrices, missing = error_bars(found, matrices)
+        modes, matrices, missing = error_bars(found, matrices, work=barring)
         after += missing
     warnings = (
         *_order_warnings(realization, modes),

@@ -18,6 +18,7 @@ from identification.forced_model import forced_model
 from identification.modes import Modes
 from identification.observer import observe
 from identification.okid import okid_era, realize
+from identification.progress import UNHEARD, Work
 from identification.recording import Array, Recording
 from identification.residual_scatter import residual_scatter
 from identification.second_order import second_order
@@ -46,6 +47,7 @@ def observer_scatter(
     *,
     orders: Sequence[int] | None = None,
     matrices: SecondOrder | None = None,
+    work: Work = UNHEARD,
 ) -> Scatter:
     """Standard deviations of modes, and of M, C_d and K, with what noise shifts on average in them.
 
@@ -55,6 +57,7 @@ def observer_scatter(
         modes: those found.
         orders: of the model that each mode was read from; the realization's own order when None.
         matrices: those found, of `matrix_model`.
+        work: told of every test drawn.
 
     Returns:
         Zero for data without noise; infinite where a tenth of the tests drawn lose a mode or the matrices.
@@ -88,7 +91,7 @@ def observer_scatter(
         [values_near(modes.poles, model.system.modes()), *_entries(model.system, matrices)]
     )
     std, shift = residual_scatter(
-        recording, model.residuals, estimate, n_unknowns=model.n_unknowns, truth=truth
+        recording, model.residuals, estimate, n_unknowns=model.n_unknowns, truth=truth, work=work
     )
     found = None if matrices is None else _with_std(matrices, std[2 * n :])
     return Scatter(Bars(std[:n], std[n : 2 * n], shift[n : 2 * n]), found)

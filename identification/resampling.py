@@ -8,6 +8,7 @@ from dataclasses import replace
 import numpy as np
 
 from identification.errors import IdentificationError, TooShortError
+from identification.progress import UNHEARD, Work
 from identification.recording import Array, Record, Recording
 
 STATIONARY = ("ambient", "random", "burst_random", "sweep", "multisine", "other")
@@ -17,7 +18,11 @@ PARTS = 20
 
 
 def jackknife_std(
-    recording: Recording, estimate: Callable[[Recording], Array], *, n_parts: int = PARTS
+    recording: Recording,
+    estimate: Callable[[Recording], Array],
+    *,
+    n_parts: int = PARTS,
+    work: Work = UNHEARD,
 ) -> Array:
     """One standard deviation of an estimate, from estimates that lack one part of the recording each.
 
@@ -25,6 +30,7 @@ def jackknife_std(
         recording: of one of the kinds `STATIONARY`.
         estimate: what is wanted from a recording, shape (n_values,); NaN where it cannot be had.
         n_parts: how many parts of equal length.
+        work: told of every part left out.
 
     Returns:
         Shape (n_values,); infinite where an estimate could not be had without a part.
@@ -46,7 +52,7 @@ def jackknife_std(
             f"{recording.n_samples} samples cannot be cut into {n_parts} parts; record for longer"
         )
     return spread_of_parts(
-        np.stack([estimate(without_part(recording, part, n_parts)) for part in range(n_parts)])
+        np.stack([estimate(without_part(recording, part, n_parts)) for part in work.each(range(n_parts))])
     )
 
 

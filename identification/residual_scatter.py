@@ -18,6 +18,7 @@ import numpy as np
 import scipy.fft
 
 from identification.errors import TooShortError
+from identification.progress import UNHEARD, Work
 from identification.recording import Array, Recording
 
 DRAWS = 24
@@ -51,6 +52,7 @@ def residual_scatter(
     n_unknowns: int = 0,
     truth: Array | None = None,
     rng: np.random.Generator | None = None,
+    work: Work = UNHEARD,
 ) -> Redrawn:
     """One standard deviation of an estimate and its mean error, from tests with the noise of the outputs drawn anew.
 
@@ -64,6 +66,7 @@ def residual_scatter(
         n_unknowns: numbers that were fitted to make the residuals small, which is given back to them.
         truth: what the estimate should be for the model without noise, shape (n_values,); NaN where that is not known.
         rng: source of the phases; the same ones for every call when None, so that a result can be repeated.
+        work: told of every test drawn.
 
     Returns:
         Both.
@@ -83,7 +86,7 @@ def residual_scatter(
         )
     scale = 1 / np.sqrt(1 - n_unknowns / n_values)  # what the fit has absorbed is given back
     draws = []
-    for _ in range(DRAWS):
+    for _ in work.each(range(DRAWS)):
         records = tuple(
             replace(
                 record, outputs=np.asarray(record.outputs[:, :], dtype=float) - e + scale * redrawn(e, rng)

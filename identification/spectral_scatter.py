@@ -23,6 +23,7 @@ from identification.forced_model import forced_model
 from identification.frequency_domain import spread_references
 from identification.methods import find_method
 from identification.modes import Complex, Modes
+from identification.progress import UNHEARD, Work
 from identification.recording import Array, Recording
 from identification.resampling import jackknife_std, spread_of_parts
 from identification.residual_scatter import residual_scatter
@@ -124,6 +125,7 @@ def spectral_std(
     tracks: Tracks,
     *,
     settings: Mapping[str, Any] | None = None,
+    work: Work = UNHEARD,
 ) -> Bars:
     """Standard deviations of frequencies and damping ratios, and the shift of the latter.
 
@@ -132,6 +134,7 @@ def spectral_std(
         realization: by a method of `SPECTRAL`.
         tracks: where the modes stand among its models.
         settings: further settings that the method was given.
+        work: told of every test drawn, or part left out.
 
     Returns:
         All three.
@@ -166,10 +169,10 @@ def spectral_std(
         model = forced_model(recording, modes, likeliest=True)
         truth = values_near(modes.poles, model.system.modes())
         std, shift = residual_scatter(
-            recording, model.residuals, estimate, n_unknowns=model.n_unknowns, truth=truth
+            recording, model.residuals, estimate, n_unknowns=model.n_unknowns, truth=truth, work=work
         )
     else:
-        std = jackknife_std(recording, estimate)
+        std = jackknife_std(recording, estimate, work=work)
         shift = np.full(2 * n, np.nan)
     return Bars(std[:n], std[n:], shift[n:])
 
