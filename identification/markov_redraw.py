@@ -38,7 +38,8 @@ def with_best_inputs(markov: MarkovParameters, system: StateSpace) -> StateSpace
     for k in range(len(seen)):
         seen[k], rows = rows, rows @ system.A
     Y = markov.values[1:].reshape(-1, len(markov.inputs))
-    return replace(system, B=np.linalg.lstsq(seen.reshape(-1, system.n_states), Y)[0])
+    B = np.linalg.lstsq(seen.reshape(-1, system.n_states), Y)[0]
+    return replace(system, B=np.asarray(B, dtype=float))
 
 
 def markov_scatter(
