@@ -7,6 +7,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from identification.progress import UNHEARD, Work
 from identification.recording import Array
 from lab.diagnosis.fit import Fit, fit
 from lab.diagnosis.misfit import Misfit, Parameters
@@ -55,14 +56,14 @@ def parameters_of(twin: Twin, widths: Mapping[str, float] | None = None) -> Para
     return Parameters(tuple(names), np.array(values, dtype=float), *sizes, np.eye(len(names)))
 
 
-def calibrate(misfit: Misfit, rig: Rig) -> Calibration:
+def calibrate(misfit: Misfit, rig: Rig, work: Work = UNHEARD) -> Calibration:
     """The most likely parameters of the model as it is, without any cause."""
     theta = np.zeros(misfit.parameters.n)
     misfit = replace(misfit, survey=survey_of(misfit, rig, theta))
     rough = fit(misfit, theta, observer=kalman_gain(misfit, theta, SHARES[0]), iterations=4)
     theta = rough.theta
     levels = {}
-    for share in SHARES:
+    for share in work.each(SHARES):
         gain = kalman_gain(misfit, theta, share)
         levels[share] = fit(misfit, theta, observer=gain, iterations=2, tolerance=5).objective
     plain = fit(misfit, theta, iterations=20)

@@ -7,6 +7,7 @@ from dataclasses import replace
 
 import numpy as np
 
+from identification.progress import UNHEARD, Work
 from identification.recording import Array
 from lab.diagnosis.fit import Fit, fit, objective
 from lab.diagnosis.misfit import Hypothesis, Misfit
@@ -40,7 +41,7 @@ def directions(misfit: Misfit, effects: Mapping[str, type[Effect]]) -> Iterator[
 
 
 def large_changes(
-    misfit: Misfit, present: Fit, effects: Mapping[str, type[Effect]]
+    misfit: Misfit, present: Fit, effects: Mapping[str, type[Effect]], work: Work = UNHEARD
 ) -> list[tuple[str, str, Array, Fit]]:
     """Cause, location, direction and fit of the likeliest large changes; none where the data do not ask for any.
 
@@ -50,7 +51,8 @@ def large_changes(
     tried = []
     seen = _windowed(misfit)
     reference = _level(seen, present, present.theta, present.causes)
-    for cause, location, direction in directions(misfit, effects):
+    trying, following = work.parts(2.0, 1.0)
+    for cause, location, direction in trying.each(list(directions(misfit, effects))):
         lifted = replace(seen, parameters=misfit.parameters.lifted(direction))
         for factor in DAMPING_FACTORS if cause == "damping_change" else FACTORS:
             theta = present.theta + np.log(factor) * direction / misfit.parameters.widths
@@ -60,7 +62,7 @@ def large_changes(
     for trial in sorted(tried, key=lambda trial: trial[0]):
         best.setdefault(trial[1:3], trial)
     found = []
-    for reached, cause, location, direction, theta in list(best.values())[:FOLLOWED]:
+    for reached, cause, location, direction, theta in following.each(list(best.values())[:FOLLOWED]):
         if reached < reference - WORTH:
             changed = replace(misfit, parameters=misfit.parameters.lifted(direction))
             refit = fit(changed, theta, present.causes, observer=present.observer, iterations=15)
@@ -68,14 +70,16 @@ def large_changes(
     return found
 
 
-def stiff_springs(misfit: Misfit, present: Fit, proposed: Sequence[Hypothesis]) -> list[Fit]:
+def stiff_springs(
+    misfit: Misfit, present: Fit, proposed: Sequence[Hypothesis], work: Work = UNHEARD
+) -> list[Fit]:
     """Fits with the likeliest missing springs so stiff that no step from none at all would find them.
 
     Each is tried at a few stiffnesses, as a large change is, and followed from the best: beside the parameters as they are, and
     beside nominal ones, since without the spring these may have gone far to make up for it.
     """
     seen, followed = _windowed(misfit), []
-    for theta in (present.theta, present.theta - misfit.parameters.precision @ present.theta):
+    for theta in work.each((present.theta, present.theta - misfit.parameters.precision @ present.theta)):
         reference = _level(seen, present, theta, present.causes) - WORTH
         best = []
         for h in proposed:

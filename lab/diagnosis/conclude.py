@@ -7,6 +7,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from identification.progress import UNHEARD, Work
 from identification.recording import Array, Recording
 from lab.diagnosis import words
 from lab.diagnosis.baseline import Baseline
@@ -100,6 +101,7 @@ def conclude(
     first: Sequence[Candidate],
     left: Whiteness,
     known: Baseline | None,
+    work: Work = UNHEARD,
 ) -> Diagnosis:
     """What a diagnosis tells: findings with their sizes, alternatives, the extended model, and the gain on data kept aside.
 
@@ -111,6 +113,7 @@ def conclude(
         first: candidates of the first search.
         left: whether what remains is noise.
         known: what the baseline taught.
+        work: told how much of this is done.
     """
     causes = effects_of(state)
     calibrated = calibrated_rig(state.misfit, state.origin.theta, rig)
@@ -122,7 +125,7 @@ def conclude(
     floor = noise_floor(state.fit.residual, held_out(misfit))
     starts = [best_starts(misfit), starts_of(misfit, state.origin.theta), starts_of(misfit, state.fit.theta)]
     predictions = predictions_of(
-        recording, misfit, (nominal, calibrated, extended), starts, accuracy=max(0.2 * floor, 1e-6)
+        recording, misfit, (nominal, calibrated, extended), starts, accuracy=max(0.2 * floor, 1e-6), work=work
     )
     shares = _shares(state, floor)
     findings = [

@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from dataclasses import replace
 
 import numpy as np
 
+from identification.progress import Progress, Work
 from identification.recording import Recording
 from lab.diagnosis.baseline import Baseline
 from lab.diagnosis.calibrate import Calibration, calibrate, parameters_of, survey_of
@@ -23,6 +24,7 @@ from lab.diagnosis.starts import free_decays, with_starts
 from lab.diagnosis.state import State
 from lab.diagnosis.tolerance import wrong_parameters
 from lab.diagnosis.whiteness import patches, whiteness
+from lab.diagnosis.words import FURTHER
 from lab.effects import EFFECTS
 from lab.effects.effect import Effect
 from lab.errors import LabError
@@ -36,8 +38,8 @@ LAW_SUBSTEPS = 12
 """Substeps where the model has a law or one was found, so that its numerics are not taken for another cause."""
 FINE_SUBSTEPS = 24
 """Substeps of the last fits, where the numerics must not be mistaken for physics."""
-
-Progress = Callable[[str], None]
+COSTS = 2.0, 9.0, 2.0, 4.0
+"""Of calibration, search, refits with what was found, and conclusions, as measured."""
 
 
 def diagnose(
@@ -57,7 +59,7 @@ def diagnose(
         baseline: of the same rig in its known state; it calibrates the model first.
         widths: prior standard deviations, relative, by group ("mass", "stiffness", "damping") or parameter.
         effects: the causes that may be named.
-        progress: told what is being done.
+        progress: told what is being done, and the share of it that is done; it falls where the search goes on.
 
     Raises:
         LabError: recording and model do not fit together, or the recording has no measured input.
@@ -68,17 +70,18 @@ def diagnose(
         return diagnose_spectra(
             recording, rig, baseline=baseline, widths=widths, effects=effects, progress=progress
         )
-    tell = progress or (lambda what: None)
+    before, whole = Work(progress).parts(0.0 if baseline is None else COSTS[0], sum(COSTS))
+    calibrating, searching, accepting, concluding = whole.parts(*COSTS)
     rig = nominal = _connected(rig, recording)
     model = twin(rig)
     parameters = parameters_of(model, widths)
     known = None
     if baseline is not None:
-        tell("calibrating on the baseline")
+        before = before.called("calibrating on the baseline")
         known_state = _like(baseline, recording)
         base = Misfit.of(known_state, model, parameters, share=1.0)
         base = with_starts(base, free_decays(known_state))
-        known = Baseline.of(calibrate(base, rig))
+        known = Baseline.of(calibrate(base, rig, before))
         # What the baseline taught becomes the model, and what it left open the prior.
         rig = calibrated_rig(base, known.fit.theta, rig)
         model, parameters = twin(rig), _tightened(parameters, known.fit)
@@ -86,16 +89,17 @@ def diagnose(
     misfit = replace(misfit, colour=known.colour if known else 1.0)
     if model.plant.laws:
         misfit = replace(misfit, substeps=LAW_SUBSTEPS)
-    tell("calibrating")
-    calibration = calibrate(misfit, rig)
+    calibration = calibrate(misfit, rig, calibrating.called("calibrating"))
     found = calibration.fit
     state = State(calibration, found, (), found, (held_out_error(calibration.misfit, found),))
     inputs = misfit.driven
     first: list[Candidate] = []
     left = whiteness(state.fit.residual, inputs)
     while len(state.accepted) < MOST_FINDINGS:
-        tell("searching for causes" if not state.accepted else f"searching on, {len(state.accepted)} found")
-        candidates, threshold = search(state.calibration, state.fit, effects)
+        if state.accepted:
+            searching, accepting, concluding = Work(progress).parts(*COSTS[1:])
+        searching = searching.called(f"searching for a {FURTHER.get(len(state.accepted), 'first')} cause")
+        candidates, threshold = search(state.calibration, state.fit, effects, searching)
         if candidates:
             better = settled(state.misfit, state.fit, candidates[0].fit)
             if better.objective < state.fit.objective - UNSETTLED:
@@ -104,6 +108,7 @@ def diagnose(
         first = first or candidates
         if not candidates or candidates[0].gain < threshold:
             break
+        accepting.called("fitting what was found")
         further = _with(state, candidates[0], rig)
         finely = _finely(further)
         covered = known is not None and known.covers(finely.misfit, finely.fit)
@@ -118,7 +123,8 @@ def diagnose(
             break
     state = _finely(_without_idle(state))
     left = whiteness(state.fit.residual, inputs)
-    return conclude(state, recording, nominal, rig, first, left, known)
+    told = concluding.called("simulating what was found")
+    return conclude(state, recording, nominal, rig, first, left, known, told)
 
 
 def _connected(rig: Rig, recording: Recording) -> Rig:

@@ -6,6 +6,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from identification.progress import UNHEARD, Work
 from identification.recording import Array, Recording
 from lab.diagnosis.fit import POOL, Fit
 from lab.diagnosis.misfit import Misfit
@@ -25,6 +26,7 @@ def predictions_of(
     starts: Sequence[Sequence[Array | None]],
     *,
     accuracy: float,
+    work: Work = UNHEARD,
 ) -> tuple[Prediction, ...]:
     """Measured outputs and those of nominal, calibrated and extended rig, record by record.
 
@@ -34,6 +36,7 @@ def predictions_of(
         rigs: nominal, calibrated, extended.
         starts: for each of them, the motion at the start of each record, as the nominal rig has it.
         accuracy: of the simulation.
+        work: told of every rig.
     """
     dofs = rigs[0].dofs
 
@@ -44,7 +47,10 @@ def predictions_of(
     return tuple(
         Prediction(measured, nominal, calibrated, extended, first)
         for (_, measured), nominal, calibrated, extended, first in zip(
-            misfit.records, *POOL.map(simulated, rigs, starts), misfit.n_train, strict=True
+            misfit.records,
+            *work.each(POOL.map(simulated, rigs, starts), len(rigs)),
+            misfit.n_train,
+            strict=True,
         )
     )
 

@@ -7,6 +7,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from identification.progress import UNHEARD, Work
 from identification.recording import Array
 from lab.diagnosis.chance import NO_CHANCE, Chance
 from lab.diagnosis.fit import POOL, cause_slopes, moved_by, objective, theta_slopes, weights
@@ -52,6 +53,7 @@ def screen(
     present: Sequence[Hypothesis],
     observer: Array,
     proposed: Sequence[Hypothesis],
+    work: Work = UNHEARD,
 ) -> tuple[list[Screened], Array]:
     """Hypotheses by falling score: the likelihood gained in a few steps, less the price of their variables.
 
@@ -134,9 +136,10 @@ def screen(
                 break
         return started
 
-    looks = list(POOL.map(looked_at, proposed))
+    looking, following = work.parts(len(proposed), STEPPED_ON)
+    looks = list(looking.each(POOL.map(looked_at, proposed), len(proposed)))
     lucky = np.max([NO_CHANCE, *(each for _, each in looks)], axis=0)
     first = sorted((started for started, _ in looks), key=lambda started: -score(started))
-    again = list(POOL.map(followed, first[:STEPPED_ON]))
+    again = list(following.each(POOL.map(followed, first[:STEPPED_ON]), STEPPED_ON))
     rows = [Screened(started[0], score(started)) for started in again + first[STEPPED_ON:]]
     return sorted(rows, key=lambda row: -row.score), lucky

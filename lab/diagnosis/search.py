@@ -7,6 +7,7 @@ from dataclasses import replace
 
 import numpy as np
 
+from identification.progress import UNHEARD, Work
 from identification.recording import Array
 from lab.diagnosis.calibrate import Calibration
 from lab.diagnosis.candidate import Candidate, last_of
@@ -26,16 +27,22 @@ REFITTED, PER_CAUSE, POLISHED = 10, 2, 3
 KEPT = 5
 """Candidates kept after each stage of their refits, besides those that are as good within `CLOSE`."""
 CLOSE = 30.0
+COSTS = 26.0, 18.0, 3.0, 1.0, 3.0, 1.0
+"""Of screening, refits, polish, the model's own parameters, large changes and stiff springs, as measured."""
 NEGLIGIBLE = 1e-3
 """Unknown force, as a share of the inertia forces, that nobody would miss in a model."""
 
 
 def search(
-    calibration: Calibration, present: Fit, effects: Mapping[str, type[Effect]]
+    calibration: Calibration,
+    present: Fit,
+    effects: Mapping[str, type[Effect]],
+    work: Work = UNHEARD,
 ) -> tuple[list[Candidate], float]:
     """Candidates for one more cause beside those present, best first, and the 2 log evidence that chance alone may reach."""
     misfit = calibration.misfit
     causes = present.causes
+    screening, refitting, polishing, confirming, changing, stiffening = work.parts(*COSTS)
     if causes:
         theta, observer = present.theta, present.observer
     else:
@@ -47,7 +54,7 @@ def search(
     proposed = [
         h for h in proposed if not mends(h.kind, h.location, found, survey) and not echoes(h, causes, survey)
     ]
-    rows, lucky = screen(misfit, theta, causes, observer, proposed)
+    rows, lucky = screen(misfit, theta, causes, observer, proposed, screening)
     picked: list[Hypothesis] = []
     places: set[tuple[str, str, str]] = set()
     for row in rows:
@@ -58,21 +65,23 @@ def search(
             picked.append(h)
             places.add(key)
     without = minus_two_log_evidence(present)
-    refits = _refitted(calibration, theta, present, picked)
+    refits = _refitted(calibration, theta, present, picked, refitting)
     scored = sorted((last_of(f, g, without) for f, g in refits), key=lambda c: -c.gain)
-    best = [_polished(misfit, c, without) for c in scored[:POLISHED]] + scored[POLISHED:]
+    best = [_polished(misfit, c, without) for c in polishing.each(scored[:POLISHED])] + scored[POLISHED:]
     own = sorted(wrong_parameters(misfit, present, without, effects), key=lambda c: -c.gain)
-    candidates = [confirmed(misfit, c, without) for c in own[:POLISHED]]
+    candidates = [confirmed(misfit, c, without) for c in confirming.each(own[:POLISHED])]
     # What was not confirmed may not rank before what was.
     weakest = min((c.gain for c in candidates), default=0.0)
     candidates += [replace(c, gain=min(c.gain, weakest)) for c in own[POLISHED:]]
     candidates += _steadied(calibration, best, without)
     candidates += [
         Candidate(cause, place, found, without - minus_two_log_evidence(found), direction)
-        for cause, place, direction, found in large_changes(misfit, present, effects)
+        for cause, place, direction, found in large_changes(misfit, present, effects, changing)
         if not mends(effects[cause], place, [(each.kind, each.location) for each in causes], survey)
     ]
-    candidates += [last_of(found, None, without) for found in stiff_springs(misfit, present, proposed)]
+    candidates += [
+        last_of(found, None, without) for found in stiff_springs(misfit, present, proposed, stiffening)
+    ]
     band = 1 / survey.duration, 0.5 / survey.dt
     candidates = [c for c in candidates if c.direction is not None or plausible(c.fit.causes[-1], band)]
     ranked: dict[tuple[str, str], Candidate] = {}
@@ -82,7 +91,7 @@ def search(
 
 
 def _refitted(
-    calibration: Calibration, theta: Array, present: Fit, picked: Sequence[Hypothesis]
+    calibration: Calibration, theta: Array, present: Fit, picked: Sequence[Hypothesis], work: Work
 ) -> list[tuple[Fit, Fit | None]]:
     """Complete fits with each new cause, trusting the measurements less and less; the hopeless are dropped on the way.
 
@@ -95,19 +104,23 @@ def _refitted(
     running: list[tuple[Array, tuple[Hypothesis, ...], Fit | None]] = [
         (theta, (*present.causes, h), None) for h in picked
     ]
-    for share in shares:
+    *leading_, rough, whole = work.parts(*[3.0 for _ in shares], 2.0, 3.0)
+    for share, part in zip(shares, leading_, strict=True):
         led = [
             tried(misfit, theta, causes, kalman_gain(misfit, theta, share), iterations=3, tolerance=20)
-            for theta, causes, _ in running
+            for theta, causes, _ in part.each(running)
         ]
         running = [(f.theta, f.causes, f) for f in leading([f for f in led if f is not None])]
     first = [
         (tried(misfit, theta, causes, present.observer, iterations=2, tolerance=1), guided)
-        for theta, causes, guided in running
+        for theta, causes, guided in rough.each(running)
     ]
     plain = {id(f): guided for f, guided in first if f is not None}
     kept = leading([f for f, _ in first if f is not None])
-    found = [(tried(misfit, f.theta, f.causes, present.observer, iterations=6), plain[id(f)]) for f in kept]
+    found = [
+        (tried(misfit, f.theta, f.causes, present.observer, iterations=6), plain[id(f)])
+        for f in whole.each(kept)
+    ]
     return [(f, guided) for f, guided in found if f is not None]
 
 

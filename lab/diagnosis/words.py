@@ -11,6 +11,7 @@ from lab.diagnosis.outcome import Alternative, Quantity
 from lab.diagnosis.whiteness import Whiteness
 from lab.effects.effect import EVERYWHERE, Effect
 
+FURTHER = {1: "second", 2: "third", 3: "fourth"}
 ALIKE = {
     frozenset({"hysteresis", "coulomb_friction"}): "repeat the test at two other levels",
     frozenset({"hysteresis", "quadratic_damping"}): "repeat the test at two other levels",

@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 import itertools
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from dataclasses import replace
 from typing import Any
 
 import numpy as np
 
+from identification.progress import Progress, Work
 from identification.recording import Recording
 from identification.response import FrequencyResponse
 from lab.diagnosis.calibrate import Calibration, parameters_of
@@ -34,7 +35,7 @@ from lab.diagnosis.spectral.smallest import in_words, smallest_changes, smallest
 from lab.diagnosis.spectral.stage import Stage, confirmed, predicted, settled, with_cause, without_idle
 from lab.diagnosis.spectral.tones import FoundTone
 from lab.diagnosis.state import State
-from lab.diagnosis.words import advice, says
+from lab.diagnosis.words import FURTHER, advice, says
 from lab.effects import EFFECTS
 from lab.effects.effect import Effect
 from lab.rig import Rig
@@ -55,7 +56,7 @@ def diagnose_spectra(
     widths: Mapping[str, float] | None = None,
     effects: Mapping[str, type[Effect]] = EFFECTS,
     band: tuple[float, float] | None = None,
-    progress: Callable[[str], None] | None = None,
+    progress: Progress | None = None,
 ) -> Diagnosis:
     """What the model gets wrong in spectra of outputs, or in frequency responses, and the model that does not.
 
@@ -71,7 +72,7 @@ def diagnose_spectra(
         widths: prior standard deviations, relative, by group ("mass", "stiffness", "damping") or parameter.
         effects: the causes that may be named, as far as such data can show them.
         band: lowest and highest frequency used [Hz]; all when None.
-        progress: told what is being done.
+        progress: told what is being done, and the share of it that is done; it falls where the search goes on.
 
     Returns:
         The diagnosis, with `spectra` in place of predictions sample by sample.
@@ -81,18 +82,18 @@ def diagnose_spectra(
 
     Source: Whittle (1953), Ark. Mat. 2, 423-434, for the likelihood; Schwarz (1978), Ann. Stat. 6, for the evidence.
     """
-    tell = progress or (lambda what: None)
+    work = Work(progress)
     rig = nominal = rig.connected(
         inputs=[channel.name for channel in data.inputs], outputs=[channel.name for channel in data.outputs]
     )
     model = twin(rig)
     parameters = parameters_of(model, widths)
     if baseline is not None:
-        tell("calibrating on the baseline")
+        work("calibrating on the baseline", 0.0)
         known = _calibrated(_experiment(baseline, rig, band, share=1.0), rig, parameters)
         rig = calibrated_rig(known.likelihood, known.fit.theta, rig)
         parameters, model = _tightened(parameters, known.fit), twin(rig)
-    tell("calibrating")
+    work("calibrating", 0.1)
     stage = origin = _calibrated(_experiment(data, rig, band), rig, parameters)
     visible = {name: kind for name, kind in effects.items() if name in stage.experiment.visible}
     given = _as_given(stage.likelihood, stage.fit)
@@ -100,7 +101,8 @@ def diagnose_spectra(
     refused: Candidate | FoundTone | None = None
     looks = 1
     while len(stage.accepted) < MOST_FINDINGS:
-        tell("searching for causes" if not stage.accepted else f"searching on, {len(stage.accepted)} found")
+        number = FURTHER.get(len(stage.accepted), "first")
+        work(f"searching for a {number} cause", 0.0 if stage.accepted else 0.25)
         ranked, looks = _ranked(stage, visible, given if not stage.accepted else None)
         if not ranked or ranked[0].gain < evidence_threshold(looks):
             break
@@ -113,6 +115,7 @@ def diagnose_spectra(
             refused = ranked[0]
             break
         first, stage = first or ranked, without_idle(step)
+    work("predicting what was kept aside", 0.85)
     told = _outcome(stage, origin, given, nominal, rig, first, refused)
     return replace(told, unlearnable=_too_small(stage, visible, evidence_threshold(looks)))
 
