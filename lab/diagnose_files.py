@@ -6,9 +6,10 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
+from identification.progress import UNHEARD, Progress, Work
 from identification.response import FrequencyResponse
-from lab.diagnosis.calibrate import WIDTHS, parameters_of
-from lab.diagnosis.diagnose import Progress, diagnose
+from lab.diagnosis.calibrate import WIDTHS, gain_names, parameters_of
+from lab.diagnosis.diagnose import diagnose
 from lab.diagnosis.outcome import Diagnosis
 from lab.diagnosis.spectral.diagnose import diagnose_spectra
 from lab.effects import EFFECTS
@@ -29,6 +30,8 @@ from lab.twin import twin
 
 PERIODS_SHOWN = 20
 """Length of the motion kept for the viewer, in periods of the lowest mode."""
+COSTS = 1.0, 10.0, 3.0
+"""Of reading (and loading what fits), diagnosing and writing, as measured."""
 
 
 def diagnose_file(
@@ -56,7 +59,7 @@ def diagnose_file(
         effects: names of the causes that may be named; all of the catalogue when None.
         force: replace an earlier output there.
         command: how the lab was called, for the report.
-        progress: told what is being done.
+        progress: told what is being done, and the share of it that is done; it falls where the search goes on.
 
     Returns:
         The diagnosis, and what it was found in, with channels as the model names them.
@@ -66,6 +69,8 @@ def diagnose_file(
         LabError, IdentificationError: the files do not fit together, or the folder cannot be written.
     """
     with output_folder(out, force=force) as folder:
+        reading, diagnosing, writing = Work(progress).parts(*COSTS)
+        reading.called("reading")
         names = read_mapping(mapping) if isinstance(mapping, str | Path) else mapping or {}
         recording = _named(path, names)
         rig = matched(load_model(model), recording)
@@ -77,12 +82,10 @@ def diagnose_file(
             baseline=known,
             widths=_widths(widths or {}, rig),
             effects=_effects(effects),
-            progress=progress,
+            progress=None if progress is None else diagnosing,
         )
-        if progress is not None:
-            progress("writing the report")
         facts = _facts({"Recording": path, "Model": model, "Baseline": baseline, "Names": mapping})
-        present_diagnosis(folder, diagnosis, recording, command=command, facts=facts)
+        present_diagnosis(folder, diagnosis, recording, command=command, facts=facts, work=writing)
     return diagnosis, recording
 
 
@@ -93,6 +96,7 @@ def present_diagnosis(
     *,
     command: str = "",
     facts: dict[str, str] | None = None,
+    work: Work = UNHEARD,
 ) -> None:
     """Writes diagnosis.json, extended.xml, report.html and run.rrd into a folder.
 
@@ -102,14 +106,19 @@ def present_diagnosis(
         recording: what it was found in, with the channels of the diagnosis.
         command: how the lab was called.
         facts: further facts to reproduce it, by name.
+        work: told how much of this is done.
     """
     # Imported here because drawing is slow to load and `lab` must come up without it.
     from lab.show.diagnosis_report import write_diagnosis_report
     from lab.show.rerun_log.diagnosis import write_diagnosis_rrd
 
+    reporting, showing = work.called("writing the report").parts(4.0, 1.0)
     save_diagnosis(diagnosis, folder / "diagnosis.json")
     diagnosis.extended.save(folder / "extended.xml")
-    write_diagnosis_report(folder / "report.html", diagnosis, recording, command=command, facts=facts)
+    write_diagnosis_report(
+        folder / "report.html", diagnosis, recording, command=command, facts=facts, work=reporting
+    )
+    showing.done(0.0)
     write_diagnosis_rrd(folder / "run.rrd", diagnosis, recording, motions=_first_swings(diagnosis, recording))
 
 
@@ -121,7 +130,8 @@ def _named(path: str | Path, names: Names) -> Diagnosed:
 
 
 def _widths(given: Mapping[str, float], rig: Rig) -> Mapping[str, float]:
-    known = (*WIDTHS, *parameters_of(twin(rig)).names) if given else ()
+    model = twin(rig)
+    known = (*WIDTHS, "gain", *parameters_of(model).names, *gain_names(model))
     for name in given:
         if name not in known:
             raise UnknownNameError(

@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 
+from identification.progress import UNHEARD, Progress, Work
 from identification.recording import Array
 from lab.errors import LabError
 from lab.files.folder import output_folder
@@ -30,6 +31,7 @@ def place_file(
     test: Mapping[str, Any] | None = None,
     force: bool = False,
     command: str = "",
+    progress: Progress | None = None,
     **settings: Any,
 ) -> tuple[Placement, Rig]:
     """Where sensors and actuators of a model should go: found, written, shown.
@@ -42,6 +44,7 @@ def place_file(
         test: excitation, level, sample_rate, duration, noise_percent and seed of the test, where they differ.
         force: replace an earlier output there.
         command: how the lab was called, for the report.
+        progress: told what is being done, and the share of it that is done.
         settings: as for `lab.placement.place.place`.
 
     Returns:
@@ -57,26 +60,35 @@ def place_file(
         plan = _plan(_frequencies(rig, n_sensors, settings), planned_test, dict(test or {}))
         if planned_test is not None:
             settings = {**settings, "planned": _layout(planned_test)}
-        placement = place(rig, n_sensors, plan=plan, **settings)
+        placement = place(rig, n_sensors, plan=plan, progress=progress, **settings)
         facts = {
             name: str(value)
             for name, value in (("Model", model), ("Scenario", scenario))
             if value is not None
         }
-        present_placement(folder, placement, rig, command=command, facts=facts)
+        writing = Work(progress).called("writing the report")
+        present_placement(folder, placement, rig, command=command, facts=facts, work=writing)
     return placement, rig
 
 
 def present_placement(
-    folder: Path, placement: Placement, rig: Rig, *, command: str = "", facts: Mapping[str, str] | None = None
+    folder: Path,
+    placement: Placement,
+    rig: Rig,
+    *,
+    command: str = "",
+    facts: Mapping[str, str] | None = None,
+    work: Work = UNHEARD,
 ) -> None:
-    """Writes placement.json, report.html and run.rrd into a folder; arguments as for `place_file`."""
+    """Writes placement.json, report.html and run.rrd into a folder, telling `work`; all else as for `place_file`."""
     # Imported here because drawing is slow to load and `lab` must come up without it.
     from lab.show.placement_report import write_placement_report
     from lab.show.rerun_log.placement import write_placement_rrd
 
     save_placement(placement, folder / "placement.json")
+    showing = work.parts(2.0, 1.0)[1]
     write_placement_report(folder / "report.html", placement, rig, command=command, facts=facts)
+    showing.done(0.0)
     write_placement_rrd(folder / "run.rrd", placement, rig)
 
 

@@ -7,6 +7,7 @@ from pathlib import Path
 
 import numpy as np
 
+from identification.progress import UNHEARD, Work
 from identification.recording import Recording
 from identification.response import FrequencyResponse
 from lab.excitation import Excitation
@@ -20,6 +21,8 @@ from lab.simulate import Motion, motion
 
 PERIODS_SHOWN = 20
 """Length of the motion kept for the viewer, in periods of the lowest mode."""
+COSTS = 4.0, 1.0
+"""Seconds that the report and what the viewer shows take, typically."""
 
 
 def present(
@@ -31,6 +34,7 @@ def present(
     scenario: Scenario | None = None,
     rig: Rig | None = None,
     source: str | Path | None = None,
+    work: Work = UNHEARD,
 ) -> None:
     """Write result.json, report.html and run.rrd into a folder.
 
@@ -42,11 +46,13 @@ def present(
         scenario: the test behind it, if there is one.
         rig: the rig behind it, if there is one.
         source: file that the recording was read from, if it was given.
+        work: told how much of this is done.
     """
     # Imported here because drawing is slow to load and `lab` must come up without it.
     from lab.show.report import write_report
     from lab.show.rerun_log import write_rrd
 
+    reporting, showing = work.parts(*COSTS)
     save_result(result, folder / "result.json")
     write_report(
         folder / "report.html",
@@ -55,7 +61,9 @@ def present(
         scenario_text=scenario.text if scenario else "",
         command=command,
         facts=_given(source, scenario) | _facts(recording, rig, scenario),
+        work=reporting,
     )
+    showing.done(0.0)
     moved = _first_swings(rig, scenario) if rig and scenario else None
     write_rrd(folder / "run.rrd", result, recording, rig=rig, motion=moved)
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import replace
 from functools import cache
 from pathlib import Path
@@ -13,6 +13,7 @@ import numpy as np
 from identification.errors import RecordingError
 from identification.from_responses import identify_responses
 from identification.identify import Identification, identify
+from identification.progress import Progress, Work
 from identification.recording import Recording
 from identification.response import FrequencyResponse
 from lab.compare import compare
@@ -29,9 +30,6 @@ from lab.rig import Rig
 from lab.scenario import Scenario, load_scenario
 from lab.simulate import simulate_to_file
 from lab.validation import validate
-
-Progress = Callable[..., None]
-"""Called with the number of samples simulated since the last call, and `total`, how many there are in all."""
 
 
 def run(
@@ -50,7 +48,7 @@ def run(
             scenario asks for one.
         force: replace an earlier output there.
         command: how the test was called, for the report.
-        progress: told how far the simulation is.
+        progress: told what is being done, and the share of it that is done: of the simulation, then of the analysis.
 
     Raises:
         LabError, IdentificationError: something in the scenario is wrong, or the folder cannot be written.
@@ -59,7 +57,7 @@ def run(
         scenario = load_scenario(scenario)
     with output_folder(out, force=force) as folder:
         rig = rig_of(scenario)
-        _record(folder / "recording.h5", rig, scenario, progress)
+        _record(folder / "recording.h5", rig, scenario, Work(progress).called("simulating"))
         recording = load(folder / "recording.h5")
         chosen = scenario.identification
         result = examine(
@@ -68,13 +66,17 @@ def run(
             order=chosen.order,
             dofs=touched(rig),
             refine=chosen.refine,
+            progress=progress,
             **chosen.settings,
         )
         result = replace(held_against(truth_of(scenario, rig), result, scenario), title=scenario.title)
         result = _validated(result, recording, scenario)
         if scenario.diagnosis is not None:
-            result = _diagnosed(folder / "diagnosis", result, recording, scenario, command)
-        present(folder, result, recording, scenario=scenario, rig=rig, command=command)
+            result = _diagnosed(
+                folder / "diagnosis", result, recording, scenario, command=command, progress=progress
+            )
+        writing = Work(progress).called("writing the report")
+        present(folder, result, recording, scenario=scenario, rig=rig, command=command, work=writing)
     return result
 
 
@@ -87,6 +89,7 @@ def identify_file(
     refine: bool = False,
     force: bool = False,
     command: str = "",
+    progress: Progress | None = None,
     **settings: Any,
 ) -> Result:
     """What a recording file tells by itself: modes, and M, C, K where the set-up allows.
@@ -99,6 +102,7 @@ def identify_file(
         refine: move modes and matrices to the maximum of the likelihood; needs measured forces, or free decays.
         force: replace an earlier output there.
         command: how the lab was called, for the report.
+        progress: told what is being done, and the share of it that is done.
         settings: further settings of the method.
 
     Raises:
@@ -110,11 +114,13 @@ def identify_file(
             if refine:
                 raise RecordingError(f"{path} holds frequency responses alone; to refine, samples are needed")
             data = load_responses(path)
+            Work(progress).called("identifying")
             result = examine_responses(data, method, order=order, **settings)
         else:
             data = load(path)
-            result = examine(data, method, order=order, refine=refine, **settings)
-        present(folder, result, data, command=command, source=path)
+            result = examine(data, method, order=order, refine=refine, progress=progress, **settings)
+        writing = Work(progress).called("writing the report")
+        present(folder, result, data, command=command, source=path, work=writing)
     return result
 
 
@@ -161,6 +167,7 @@ def examine(
     order: int | None = None,
     dofs: Sequence[str] | None = None,
     refine: bool = False,
+    progress: Progress | None = None,
     **settings: Any,
 ) -> Result:
     """The result of identifying a recording, without any truth beside it.
@@ -171,12 +178,13 @@ def examine(
         order: number of states; chosen from the data when None.
         dofs: names of the degrees of freedom of M, C, K, in the order wanted.
         refine: move modes and matrices to the maximum of the likelihood; needs measured forces, or free decays.
+        progress: as for `identify`.
         settings: further settings of the method.
 
     Raises:
         IdentificationError: the recording or the request is at fault.
     """
-    found = identify(recording, method, order=order, dofs=dofs, refine=refine, **settings)
+    found = identify(recording, method, order=order, dofs=dofs, refine=refine, progress=progress, **settings)
     return _result(found, recording.title, recording.sample_rate)
 
 
@@ -242,7 +250,13 @@ def _validated(result: Result, recording: Recording, scenario: Scenario) -> Resu
 
 
 def _diagnosed(
-    folder: Path, result: Result, recording: Recording, scenario: Scenario, command: str
+    folder: Path,
+    result: Result,
+    recording: Recording,
+    scenario: Scenario,
+    *,
+    command: str,
+    progress: Progress | None,
 ) -> Result:
     """The result with the diagnosis judged; the folder holds what `lab diagnose` writes."""
     # Imported here because few scenarios are diagnosed, and the search for causes is slow to load.
@@ -255,7 +269,7 @@ def _diagnosed(
     assert asked is not None
     # Titled before, so that the report names the test.
     recording = replace(recording, title=scenario.title)
-    diagnosis = diagnose(recording, model_of(scenario), widths=asked.widths)
+    diagnosis = diagnose(recording, model_of(scenario), widths=asked.widths, progress=progress)
     folder.mkdir()
     facts = {
         "Scenario": f"{scenario.title}; word for word in report.html of the folder above",
@@ -275,14 +289,19 @@ def _diagnosed(
     )
 
 
-def _record(path: Path, rig: Rig, scenario: Scenario, progress: Progress | None) -> None:
-    drive, test = scenario.drive(), scenario.test
+def _record(path: Path, rig: Rig, scenario: Scenario, work: Work) -> None:
+    drive, test, simulated = scenario.drive(), scenario.test, 0
 
     @cache
     def total() -> int:
         sampling = Sampling(test.sample_rate, round(test.duration * test.sample_rate))
         one_run = drive.loads(rig, sampling, np.random.default_rng(scenario.seed))
         return test.runs * sum(load.n_samples for load in one_run)
+
+    def count(n: int) -> None:
+        nonlocal simulated
+        simulated += n
+        work.done(simulated / total())
 
     simulate_to_file(
         path,
@@ -293,5 +312,5 @@ def _record(path: Path, rig: Rig, scenario: Scenario, progress: Progress | None)
         n_runs=test.runs,
         seed=scenario.seed,
         accuracy=test.accuracy,
-        progress=(lambda n: progress(n, total=total())) if progress else None,
+        progress=None if work.listener is None else count,
     )

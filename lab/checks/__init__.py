@@ -9,6 +9,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import replace
 
+from identification.progress import Progress, Work
 from identification.recording import Recording
 from lab.checks.clipping import clipping
 from lab.checks.coherence import coherence
@@ -55,12 +56,13 @@ CHECKS: dict[str, Callable[[Survey], list[Remark]]] = {
 """One file each; the first eight in the order in which mistakes of wiring and tables hide one another."""
 
 
-def check(recording: Recording, rig: Rig | None = None) -> list[Remark]:
+def check(recording: Recording, rig: Rig | None = None, *, progress: Progress | None = None) -> list[Remark]:
     """Remarks on a recording, the most serious first.
 
     Args:
         recording: of any kind and length; read piece by piece, in about four passes.
         rig: the model that it is meant to fit; its channels are found by name.
+        progress: told what is being done, and the share of it that is done.
 
     Returns:
         One remark for each check and channel; one that shows in several records tells the first.
@@ -68,8 +70,11 @@ def check(recording: Recording, rig: Rig | None = None) -> list[Remark]:
     Raises:
         UnknownNameError: the model lacks a channel of the recording.
     """
+    work = Work(progress).called("checking")
     survey = Survey(recording, None if rig is None else fitted(rig, recording))
-    found = [remark for function in CHECKS.values() for remark in _once(function(survey))]
+    found = [
+        remark for function in work.each(CHECKS.values(), len(CHECKS)) for remark in _once(function(survey))
+    ]
     return sorted(found, key=lambda remark: SEVERITIES.index(remark.severity))
 
 

@@ -7,7 +7,7 @@ from pathlib import Path
 import click
 
 from lab.cli.colour import coloured
-from lab.cli.progress import Doing
+from lab.cli.progress import Bar
 from lab.cli.shared import FILE, example, json_option, map_option, model_option, print_json
 
 
@@ -29,14 +29,13 @@ def command(recording: Path, model: str | None, mapping: Path | None, as_json: b
     from lab.files.recording import load
     from lab.matching import read_mapping, renamed
 
-    with Doing(quiet) as doing:
-        doing("reading")
+    with Bar(quiet) as progress:
+        progress("reading", 0.0)
         data = load(recording)
         if mapping is not None:
             data = renamed(data, read_mapping(mapping))
         rig = None if model is None else load_model(model)
-        doing("checking")
-        remarks = check(data, rig)
+        remarks = check(data, rig, progress=progress)
     if as_json:
         print_json(document(data, remarks, model))
     else:

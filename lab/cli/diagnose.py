@@ -8,7 +8,7 @@ from pathlib import Path
 import click
 
 from lab.cli.completion import names_of
-from lab.cli.progress import Doing
+from lab.cli.progress import Bar
 from lab.cli.shared import (
     FILE,
     example,
@@ -73,8 +73,8 @@ def command(
     from lab.files.diagnosis import diagnosis_document
 
     folder = out or Path("out") / f"{name_of_recording(recording)}_diagnosis"
-    with Doing(quiet) as progress:
-        progress("reading")
+    with Bar(quiet) as progress:
+        progress("reading", 0.0)
         diagnosis, known = diagnose_file(
             recording,
             model,

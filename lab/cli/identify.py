@@ -6,7 +6,7 @@ from pathlib import Path
 
 import click
 
-from lab.cli.progress import Doing
+from lab.cli.progress import Bar
 from lab.cli.shared import FILE, example, method_options, name_of_recording, output_options, tell, typed
 
 
@@ -41,9 +41,16 @@ def command(
     from lab.run import identify_file
 
     folder = out or Path("out") / f"{name_of_recording(recording)}_modes"
-    with Doing(quiet) as doing:
-        doing("identifying")
+    with Bar(quiet) as progress:
+        progress("reading", 0.0)
         result = identify_file(
-            recording, folder, method=method, order=order, refine=refine, force=force, command=typed()
+            recording,
+            folder,
+            method=method,
+            order=order,
+            refine=refine,
+            force=force,
+            command=typed(),
+            progress=progress,
         )
     tell(result, folder, as_json, quiet)

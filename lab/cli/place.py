@@ -9,7 +9,7 @@ from typing import Any
 import click
 
 from lab.cli.completion import names_of
-from lab.cli.progress import Doing
+from lab.cli.progress import Bar
 from lab.cli.shared import (
     FILE,
     example,
@@ -172,8 +172,8 @@ def command(
         raise click.UsageError(f"--{name} means nothing for the target {target}.")
     asked = placement_file or Path(model or scenario or "model")
     folder = out or Path("out") / f"{asked.stem}_placement"
-    with Doing(quiet) as progress:
-        progress("placing")
+    with Bar(quiet) as progress:
+        progress("placing", 0.0)
         placement, _ = place_file(
             model,
             folder,
@@ -185,6 +185,7 @@ def command(
             noise=numbers("--noise", noise, "UNIT=STD", "m/s^2=0.01") or None,
             force=force,
             command=typed(),
+            progress=progress,
             **settings,
         )
     document, text = partial(placement_document, placement), partial(placement_summary, placement)

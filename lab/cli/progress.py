@@ -1,90 +1,74 @@
-"""What a terminal sees of long work: bars with the time left, and what is being done for how long."""
+"""What a terminal sees of long work: a bar, what is being done, and the time left."""
 
 from __future__ import annotations
 
 import sys
 import threading
 import time
-from collections.abc import Callable
 from typing import Any
 
 import click
 
+from lab.cli.time_left import TimeLeft, told
+
 CLEAR = "\r\x1b[K"
 """Back to the start of the line, which is cleared."""
+SHOW_CURSOR = "\x1b[?25h"
+"""The bar hides it."""
+STEPS = 1000
+WIDEST = 34
+"""Room for what is being done, so that the bar stays where it is."""
+FALL = 0.02
+"""Of the share done, from which on a new bar begins."""
 
 
-def _terminal(quiet: bool) -> bool:
-    return sys.stderr.isatty() and not quiet
-
-
-class Progress:
-    """A bar with the time left on a terminal, nothing elsewhere; behind its end, what is done then."""
-
-    def __init__(self, label: str, quiet: bool, *, then: str) -> None:
-        self.bar: Any = None
-        self.doing, self.then = Doing(quiet), then
-        if _terminal(quiet):
-            self.bar = click.progressbar(length=1, label=label, file=sys.stderr)
-
-    def __enter__(self) -> Callable[..., None]:
-        if self.bar is not None:
-            self.bar.__enter__()
-        return self.show
-
-    def show(self, n: int, *, total: int) -> None:
-        """Moves the bar on by n of a total."""
-        if self.bar is None:
-            return
-        self.bar.length = total
-        self.bar.update(n)
-        if self.bar.pos >= total:
-            self._end_bar()
-            self.doing.__enter__()(self.then)
-
-    def _end_bar(self) -> None:
-        self.bar.__exit__(None, None, None)
-        self.bar = None
-
-    def __exit__(self, *error: Any) -> None:
-        if self.bar is not None:
-            self._end_bar()
-        self.doing.__exit__()
-
-
-class Doing:
-    """What is being done and for how long, on one line of a terminal, and nothing elsewhere."""
+class Bar:
+    """A bar with the time left on a terminal, and nothing elsewhere; a new one where more work turns up."""
 
     def __init__(self, quiet: bool) -> None:
-        self.shown = _terminal(quiet)
-        self.what, self.since = "", 0.0
-        self.over = threading.Event()
+        self.shown = sys.stderr.isatty() and not quiet
+        self.bar: Any = None
+        self.left = TimeLeft(0.0, 0.0)
+        self.lock, self.over = threading.Lock(), threading.Event()
         self.clock: threading.Thread | None = None
 
-    def __enter__(self) -> Callable[[str], None]:
-        return self.show
+    def __enter__(self) -> Bar:
+        return self
 
-    def show(self, what: str) -> None:
-        """Tells what is being done."""
+    def __call__(self, what: str, share: float) -> None:
+        """Shows what is being done, and the share of the work that is done."""
         if not self.shown:
             return
-        self.what, self.since = what, time.monotonic()
-        self._draw()
+        with self.lock:
+            now = time.monotonic()
+            if self.bar is None or share < self.left.share - FALL:
+                self._begin(share, now)
+            self.left.reached(share, now)
+            self.bar.label = f"{what:<{WIDEST}}"
+            self.bar.pos = round(STEPS * self.left.share_of_rest)
+            self.bar.render_progress()
         if self.clock is None:
             self.clock = threading.Thread(target=self._tick, daemon=True)
             self.clock.start()
 
+    def _begin(self, share: float, now: float) -> None:
+        self.left = TimeLeft(share, now)
+        self.bar = click.progressbar(
+            length=STEPS, show_eta=False, item_show_func=lambda _: self._info(), file=sys.stderr
+        )
+
+    def _info(self) -> str:
+        now = time.monotonic()
+        return told(self.left.seconds(now), now - self.left.begun)
+
     def _tick(self) -> None:
         while not self.over.wait(1.0):
-            self._draw()
-
-    def _draw(self) -> None:
-        seconds = int(time.monotonic() - self.since)
-        passed = f" {seconds // 60}:{seconds % 60:02}" if seconds else ""
-        click.echo(f"{CLEAR}{self.what} …{passed}", nl=False, err=True)
+            with self.lock:
+                self.bar.render_progress()
 
     def __exit__(self, *error: Any) -> None:
         if self.clock is not None:
             self.over.set()
             self.clock.join()
-            click.echo(CLEAR, nl=False, err=True)
+        if self.bar is not None:
+            click.echo(CLEAR + SHOW_CURSOR, nl=False, err=True)

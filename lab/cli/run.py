@@ -7,7 +7,7 @@ from pathlib import Path
 import click
 
 from lab.cli.completion import names_of
-from lab.cli.progress import Progress
+from lab.cli.progress import Bar
 from lab.cli.shared import example, method_options, output_options, seed_option, tell, typed
 
 
@@ -39,7 +39,7 @@ def command(
 
     test = load_scenario(scenario).changed(seed=seed, method=method, order=order)
     folder = out or Path("out") / Path(scenario).stem
-    then = "identifying" if test.diagnosis is None else "identifying and diagnosing"
-    with Progress("simulating", quiet, then=then) as progress:
+    with Bar(quiet) as progress:
+        progress("simulating", 0.0)
         result = run(test, folder, force=force, command=typed(), progress=progress)
     tell(result, folder, as_json, quiet)

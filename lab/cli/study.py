@@ -2,14 +2,27 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
 
 import click
 
 from lab.cli.colour import coloured
-from lab.cli.progress import Progress
+from lab.cli.progress import Bar
 from lab.cli.shared import FILE, example, output_options, print_json, seed_option, typed
+
+
+def _counted(bar: Bar) -> Callable[..., None]:
+    """Moves a bar on by runs finished; behind the last, their outcomes are collected."""
+    finished = 0
+
+    def count(n: int, *, total: int) -> None:
+        nonlocal finished
+        finished += n
+        bar("running" if finished < total else "collecting", finished / total)
+
+    return count
 
 
 @click.command(
@@ -55,7 +68,8 @@ def command(
             raise click.UsageError(f"--seed means nothing here: {study_file} varies 'seed' itself.")
         asked = replace(asked, seed=seed)
     folder = out or Path("out") / study_file.stem
-    with Progress("running", quiet, then="collecting") as progress:
+    with Bar(quiet) as bar:
+        bar("running", 0.0)
         outcome = study(
             asked,
             folder,
@@ -63,7 +77,7 @@ def command(
             scheduler=scheduler,
             force=force,
             command=typed(),
-            progress=progress,
+            progress=_counted(bar),
         )
     if as_json:
         print_json(study_document(outcome))

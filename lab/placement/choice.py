@@ -7,6 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from identification.progress import UNHEARD, Work
 from identification.recording import Array
 from lab.placement.criteria import Criterion
 from lab.placement.search import ceiling, count, enumerated, exchange, greedy
@@ -36,7 +37,13 @@ class Choice:
 
 
 def choose(
-    grams: Array, n: int, criterion: Criterion, *, fixed: Sequence[int] = (), limit: int = LIMIT
+    grams: Array,
+    n: int,
+    criterion: Criterion,
+    *,
+    fixed: Sequence[int] = (),
+    limit: int = LIMIT,
+    work: Work = UNHEARD,
 ) -> Choice:
     """The n blocks of highest score: proven by enumeration up to a limit, else found by exchange with a bound.
 
@@ -46,14 +53,15 @@ def choose(
         criterion: score.
         fixed: blocks in every choice.
         limit: number of choices up to which all are compared.
+        work: told of every few thousand choices, or every step towards the bound.
     """
     if count(len(grams), n, n_fixed=len(fixed)) <= limit:
-        layouts, scores = enumerated(grams, n, criterion, fixed=fixed)
+        layouts, scores = enumerated(grams, n, criterion, fixed=fixed, work=work)
         order = np.argsort(-scores, kind="stable")
         layouts, scores = layouts[order], scores[order]
         best = tuple(int(block) for block in layouts[0])
         return Choice(best, float(scores[0]), float(scores[0]), True, layouts, scores)
     best = exchange(grams, greedy(grams, n, criterion, fixed=fixed), criterion, fixed=fixed)
     score = float(criterion.score(grams[list(best)].sum(axis=0)[None])[0])
-    top = ceiling(grams, best, criterion, fixed=fixed)
+    top = ceiling(grams, best, criterion, fixed=fixed, work=work)
     return Choice(best, score, top, False, np.zeros((0, n), dtype=int), np.zeros(0))

@@ -7,12 +7,13 @@ from dataclasses import replace
 
 import numpy as np
 
+from identification.progress import UNHEARD, Work
 from identification.recording import Array
 from lab.errors import LabError
 from lab.placement.arena import OFF, Arena, arena_of
 from lab.placement.candidates import Candidates, require_number
 from lab.placement.contest import Layout
-from lab.placement.diagnosis_search import LIMIT, Compared, groups
+from lab.placement.diagnosis_search import LIMIT, MAX_SETS, Compared, groups
 from lab.placement.outcome import CauseFigure, Drive, Placement, Ranked
 from lab.placement.plan import Plan, alternatives, peak, total_duration
 from lab.placement.search import count
@@ -33,6 +34,7 @@ def place_diagnosis(
     causes: Sequence[str] = (),
     planned: tuple[Sequence[int], Sequence[int]] | None = None,
     limit: int = LIMIT,
+    work: Work = UNHEARD,
 ) -> Placement:
     """The sensors and actuators with which causes are hardest to mistake for one another.
 
@@ -46,6 +48,7 @@ def place_diagnosis(
         causes: names of the causes to tell apart; the whole catalogue when empty.
         planned: sensors and actuators of a layout to be ranked too.
         limit: number of layouts of sensors up to which all are compared, for each set of actuators.
+        work: told of every set of actuators.
 
     Raises:
         LabError: impossible numbers, or more effects than fit into memory.
@@ -59,9 +62,15 @@ def place_diagnosis(
         inputs=[rig.inputs[i].name for i in sorted(actuators.channels_of(range(len(actuators))))]
     )
     actuators = replace(actuators, channels=tuple((i,) for i in range(len(actuators))))
+    gathering, comparing, telling = work.parts(
+        1.0, min(count(len(actuators), n_actuators, n_fixed=len(actuators.fixed)), MAX_SETS), 5.0
+    )
+    gathering.done(0.0)
     everything = arena_of(rig, plan, size, causes, n_acting=n_actuators)
     compared = Compared(rig, plan, everything, sensors, actuators, n_sensors, n_actuators, limit)
-    compared.search()
+    comparing.done(0.0)
+    compared.search(comparing)
+    telling.done(0.0)
     chosen, acting = compared.best
     values = np.sort(np.array(list(compared.figures.values()))) if compared.proven else np.zeros(0)
     layouts = [("best", compared.best, compared.arena)]

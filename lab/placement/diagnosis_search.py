@@ -8,6 +8,7 @@ from itertools import product
 
 import numpy as np
 
+from identification.progress import UNHEARD, Work
 from lab.placement.arena import Arena, closed
 from lab.placement.candidates import Candidates, subsets
 from lab.placement.contest import Layout
@@ -77,16 +78,17 @@ class Compared:
         """Whether every layout was compared."""
         return len(self.figures) == self.n_layouts
 
-    def search(self) -> None:
+    def search(self, work: Work = UNHEARD) -> None:
         """Compares all sets of actuators, or, of too many, those an exchange comes upon, the likeliest ones first."""
         if self.n_sets <= MAX_SETS:
-            for acting in subsets(len(self.actuators), self.n_actuators, self.actuators.fixed):
+            sets = subsets(len(self.actuators), self.n_actuators, self.actuators.fixed)
+            for acting in work.each(sets, self.n_sets):
                 self.look(acting)
             return
         # Actuators that drive every mode are a good start, whatever the causes.
         here = choose_actuators(self.rig, self.actuators, self.n_actuators)
         self.look(here)
-        while (near := self._better(here)) is not None:
+        while (near := self._better(here, work)) is not None:
             here = near
 
     def look(self, acting: tuple[int, ...]) -> Arena:
@@ -113,7 +115,7 @@ class Compared:
         # Of sets that were not looked at, all actuators together know most.
         return closed(self.parallel & self.everything.alike)
 
-    def _better(self, here: tuple[int, ...]) -> tuple[int, ...] | None:
+    def _better(self, here: tuple[int, ...], work: Work) -> tuple[int, ...] | None:
         """A set of actuators with one exchanged that is better; None when there is none, or enough were tried."""
         loose = [i for i in here if i not in self.actuators.fixed]
         for old, new in product(loose, [i for i in range(len(self.actuators)) if i not in here]):
@@ -123,6 +125,7 @@ class Compared:
             if len(self.tried) >= MAX_SETS:
                 return None
             self.look(near)
+            work.done(len(self.tried) / MAX_SETS)
             if self.tried[near] < self.tried[here] * (1 - 1e-9):
                 return near
         return None

@@ -9,6 +9,7 @@ import numpy as np
 
 from identification.information import fisher_information
 from identification.information import planned as planned_test
+from identification.progress import UNHEARD, Work
 from identification.recording import Array
 from identification.structures import free_matrices
 from lab.errors import LabError
@@ -51,6 +52,7 @@ def place_matrices(
     criterion: str = "a",
     planned: Layout | None = None,
     limit: int | None = None,
+    work: Work = UNHEARD,
 ) -> Placement:
     """The layout that allows the least scatter of M, C and K, and its rivals.
 
@@ -62,6 +64,7 @@ def place_matrices(
         criterion: "a", "d" or "e", as in `MEASURES`.
         planned: sensors and actuators of a layout to be ranked too.
         limit: number of possible layouts up to which all are compared; by their cost when None.
+        work: told of every layout compared, or start of a search.
 
     Raises:
         LabError: no layout of these candidates can give M, C and K, or there are too many entries.
@@ -69,6 +72,7 @@ def place_matrices(
     Source: De Angelis et al. (2002), J. Appl. Mech. 69, section 3, for the layouts that can; Kay (1993), eq. (3.20), for
     the least scatter.
     """
+    comparing, telling = work.parts(9.0, 1.0)
     contest = contest_of(rig, sensors, actuators, n_sensors, n_actuators, plan, criterion)
     n_layouts = comb(len(sensors) - len(sensors.fixed), n_sensors - len(sensors.fixed)) * comb(
         len(actuators) - len(actuators.fixed), n_actuators - len(actuators.fixed)
@@ -79,12 +83,13 @@ def place_matrices(
     if proven:
         if not layouts:
             raise LabError(impossible(contest))
-        figures = np.array(list(figures_of(contest, layouts)))
+        figures = np.array(list(comparing.each(figures_of(contest, layouts), len(layouts))))
         order = np.argsort(figures, kind="stable")
         best = layouts[order[0]]
     else:
         figures, order = np.zeros(0), np.zeros(0, dtype=int)
-        best = searched(contest)
+        best = searched(contest, comparing)
+    telling.done(0.0)
     ranking = [_ranked("best", contest, best, figures)]
     ranking += [
         _ranked(f"rank {k + 1}", contest, layouts[order[k]], figures) for k in range(1, min(TOLD, len(order)))

@@ -8,6 +8,7 @@ from itertools import product
 
 import numpy as np
 
+from identification.progress import UNHEARD, Work
 from lab.errors import LabError
 from lab.placement.candidates import Candidates
 from lab.placement.contest import Contest, Layout, figure, impossible
@@ -15,7 +16,7 @@ from lab.placement.contest import Contest, Layout, figure, impossible
 STARTS = 4
 
 
-def searched(contest: Contest) -> Layout:
+def searched(contest: Contest, work: Work = UNHEARD) -> Layout:
     """A good layout where there are too many to compare: exchanges of a sensor, an actuator or both from several starts."""
     rng, found = np.random.default_rng(0), []
     by_sensor = lru_cache(maxsize=128)(contest.by_sensor)
@@ -23,7 +24,7 @@ def searched(contest: Contest) -> Layout:
     def value(layout: Layout) -> float:
         return figure(by_sensor(layout[1])[list(layout[0])].sum(axis=0), contest.criterion)
 
-    for _ in range(STARTS):
+    for _ in work.each(range(STARTS)):
         here = _any_possible(contest, rng)
         best = value(here)
         while True:

@@ -7,6 +7,7 @@ from dataclasses import replace
 
 import numpy as np
 
+from identification.progress import UNHEARD, Work
 from identification.recording import Array
 from lab.errors import LabError
 from lab.placement.candidates import Candidates, motion_rows, require_number
@@ -22,6 +23,8 @@ from lab.placement.search import count, greedy
 from lab.placement.shapes import choose_actuators, normal_modes, sensor_shapes
 from lab.rig import Rig
 
+COSTS = 2.0, 1.0, 1.0, 4.0
+"""Of choosing sensors and actuators, ranking by other rules, and comparing signals, as measured."""
 SAME = 1e-9
 """Figures that differ by less, relatively, are the same."""
 
@@ -42,6 +45,7 @@ def place_modes(
     sensor_mass: float = 0.0,
     planned: tuple[Sequence[int], Sequence[int]] | None = None,
     limit: int = LIMIT,
+    work: Work = UNHEARD,
 ) -> Placement:
     """The sensors that tell the modes apart best, and the actuators that drive all of them.
 
@@ -58,10 +62,12 @@ def place_modes(
         sensor_mass: of each sensor [kg].
         planned: sensors and actuators of a layout to be ranked too.
         limit: number of layouts up to which all are compared.
+        work: told how much of this is done.
 
     Raises:
         LabError: more modes than the sensors can tell apart, an unknown criterion, or references that do not fit.
     """
+    choosing, driving, judging, signalling = work.parts(*COSTS)
     if criterion not in ("d", "a", "e", "mac"):
         raise LabError(f"criterion is {criterion!r}; expected d, a, e or mac for the target modes")
     require_number("sensor", n_sensors, sensors)
@@ -86,13 +92,15 @@ def place_modes(
     if setups > 1:
         stay = choose(grams, references, CRITERIA["visibility"], fixed=fixed[:references], limit=limit).chosen
         fixed = tuple(sorted({*fixed, *stay}))
-    found = choose(grams, total, rule, fixed=fixed, limit=limit)
+    found = choose(grams, total, rule, fixed=fixed, limit=limit, work=choosing)
     if not np.isfinite(found.score) or not np.isfinite(rule.figure(np.array(found.score))):
         raise LabError(
             f"{total} sensors among these {len(sensors)} candidates cannot tell {m} modes apart; ask for fewer modes, or "
             "allow more places"
         )
+    driving.done(0.0)
     inputs = choose_actuators(rig, actuators, n_actuators, n_modes=m, limit=limit)
+    judging.done(0.0)
     momenta = sensors.padded(rows @ (rig.second_order().mass @ shapes))
     rules = _rules(blocks, grams, momenta, total, sensors, found.chosen, rule)
     named = actuators.named(inputs)
@@ -107,6 +115,7 @@ def place_modes(
     placed = arranged(grams, found.chosen, stay, setups)
     shifts = _loading(rig, sensors, placed, shapes, sensor_mass)
     possible = found.scores[np.isfinite(found.scores)]
+    signalling.done(0.0)
     n_layouts = count(len(sensors), total, n_fixed=len(fixed))
     drives = tuple(
         _drives(rig, plan, sensors.channels_of(placed[0]), actuators.channels_of(inputs), omega, noise)

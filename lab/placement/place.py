@@ -6,6 +6,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from typing import Any
 
+from identification.progress import Progress, Work
 from lab.errors import LabError
 from lab.placement.candidates import (
     Candidates,
@@ -34,6 +35,7 @@ def place(
     plan: Plan | None = None,
     noise: Mapping[str, float] | None = None,
     planned: tuple[Sequence[str], Sequence[str]] | None = None,
+    progress: Progress | None = None,
     **settings: Any,
 ) -> Placement:
     """Where sensors and actuators should go, and what each choice costs.
@@ -50,6 +52,7 @@ def place(
         plan: the test that is planned; a random one that suits the structure when None.
         noise: standard deviation by unit, such as {"m/s^2": 0.01}; as the plan says when None.
         planned: names of the sensors and actuators of a layout to be ranked too.
+        progress: told what is being done, and the share of it that is done.
         settings: of the target: see `place_modes`, `place_matrices`, `place_diagnosis`.
 
     Returns:
@@ -60,6 +63,7 @@ def place(
     """
     if target not in TARGETS:
         raise LabError(f"target is {target!r}; expected {', '.join(TARGETS)}")
+    work = Work(progress).called("placing")
     require_known(rig, fixed, forbid)
     sensors = sensor_candidates(rig, quantity=quantity, triaxial=triaxial, fixed=fixed, forbid=forbid)
     actuators = actuator_candidates(rig, fixed=fixed, forbid=forbid)
@@ -68,7 +72,16 @@ def place(
         from lab.placement.modes import place_modes
 
         return place_modes(
-            rig, sensors, actuators, n_sensors, n_actuators, noise=noise, plan=plan, planned=other, **settings
+            rig,
+            sensors,
+            actuators,
+            n_sensors,
+            n_actuators,
+            noise=noise,
+            plan=plan,
+            planned=other,
+            work=work,
+            **settings,
         )
     # What cannot be chosen costs no work; in the same order, so that positions among the candidates stay.
     outputs = [rig.outputs[i].name for i in sorted(sensors.channels_of(range(len(sensors))))]
@@ -86,11 +99,13 @@ def place(
         from lab.placement.matrices import place_matrices
 
         return place_matrices(
-            rig, sensors, actuators, n_sensors, n_actuators, plan, planned=other, **settings
+            rig, sensors, actuators, n_sensors, n_actuators, plan, planned=other, work=work, **settings
         )
     from lab.placement.diagnosis import place_diagnosis
 
-    return place_diagnosis(rig, sensors, actuators, n_sensors, n_actuators, plan, planned=other, **settings)
+    return place_diagnosis(
+        rig, sensors, actuators, n_sensors, n_actuators, plan, planned=other, work=work, **settings
+    )
 
 
 def _found(candidates: Candidates, names: Sequence[str]) -> tuple[int, ...]:

@@ -8,6 +8,7 @@ from itertools import combinations, islice
 
 import numpy as np
 
+from identification.progress import UNHEARD, Work
 from identification.recording import Array
 from lab.placement.criteria import Criterion
 
@@ -86,7 +87,7 @@ def count(n_blocks: int, n: int, *, n_fixed: int = 0) -> int:
 
 
 def enumerated(
-    grams: Array, n: int, criterion: Criterion, *, fixed: Sequence[int] = ()
+    grams: Array, n: int, criterion: Criterion, *, fixed: Sequence[int] = (), work: Work = UNHEARD
 ) -> tuple[np.ndarray, Array]:
     """Every layout with its score, in no order.
 
@@ -95,6 +96,7 @@ def enumerated(
         n: blocks to choose, the fixed ones included.
         criterion: score.
         fixed: blocks in every layout.
+        work: told of every few thousand layouts.
 
     Returns:
         Layouts, shape (n_layouts, n), each in rising order, and scores, shape (n_layouts,).
@@ -102,7 +104,8 @@ def enumerated(
     free = [block for block in range(len(grams)) if block not in fixed]
     base = grams[list(fixed)].sum(axis=0)
     layouts, scores = [], []
-    for rows in _chunks(combinations(free, n - len(fixed))):
+    n_chunks = math.ceil(math.comb(len(free), n - len(fixed)) / CHUNK)
+    for rows in work.each(_chunks(combinations(free, n - len(fixed))), n_chunks):
         picked = np.array(rows, dtype=int).reshape(len(rows), n - len(fixed))
         G = np.broadcast_to(base, (len(rows), *base.shape)).copy()
         for column in picked.T:
@@ -120,6 +123,7 @@ def ceiling(
     *,
     fixed: Sequence[int] = (),
     iterations: int = 300,
+    work: Work = UNHEARD,
 ) -> float:
     """A score that no layout of as many blocks exceeds; the top of the criterion where its slope gives no lower one.
 
@@ -132,6 +136,7 @@ def ceiling(
         criterion: score.
         fixed: blocks in every layout.
         iterations: steps.
+        work: told of every step.
 
     Source: Boyd and Vandenberghe (2004), Convex Optimization, sections 3.1.3 and 7.5.2; Joshi and Boyd (2009), IEEE
     Trans. Signal Process. 57(2), 451-462, for the relaxation.
@@ -144,7 +149,7 @@ def ceiling(
     if not np.isfinite(criterion.score(G[None])[0]):
         G = grams.sum(axis=0) * (n / len(grams))
     slope, lowest = criterion.slope(G), np.inf
-    for k in range(iterations):
+    for k in work.each(range(iterations)):
         here = criterion.slope(G)
         # Of many tangents at a kink, an average over the way lies lowest.
         slope = here if criterion.smooth else slope + (here - slope) * (2 / (k + 2))

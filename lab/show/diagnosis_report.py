@@ -2,15 +2,18 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
+from functools import partial
 from pathlib import Path
 
+from identification.progress import UNHEARD, Work
 from identification.recording import Recording
 from lab.diagnosis.outcome import UNEXPLAINED, Diagnosis
 from lab.diagnosis.restoring import restoring_force
 from lab.show.diagnosed import Diagnosed, about, title_of
+from lab.show.figures.canvas import Drawing
 from lab.show.figures.causes import calibration_figure, causes_figure
-from lab.show.figures.diagnosis import draw_diagnosis
+from lab.show.figures.diagnosis import figures_of
 from lab.show.figures.restoring import restoring_figure
 from lab.show.findings import (
     alternative_table,
@@ -36,6 +39,7 @@ def write_diagnosis_report(
     *,
     command: str = "",
     facts: Mapping[str, str] | None = None,
+    work: Work = UNHEARD,
 ) -> None:
     """Writes one HTML file that needs no other; the same data give the same bytes.
 
@@ -45,16 +49,18 @@ def write_diagnosis_report(
         recording: what it was found in, with the channels of the diagnosis.
         command: how the lab was called.
         facts: further facts to reproduce the diagnosis, by name.
+        work: told of every figure.
     """
     path = Path(path)
     restoring = restoring_force(diagnosis, recording) if isinstance(recording, Recording) else None
     standing = any(channel.quantity == "displacement" for channel in recording.outputs)
-    drawings = [
-        causes_figure(diagnosis),
-        None if restoring is None else restoring_figure(restoring, static=standing),
-        *draw_diagnosis(diagnosis, recording),
-        calibration_figure(diagnosis),
+    figures: list[Callable[[], Drawing | None]] = [
+        partial(causes_figure, diagnosis),
+        *([] if restoring is None else [partial(restoring_figure, restoring, static=standing)]),
+        *figures_of(diagnosis, recording),
+        partial(calibration_figure, diagnosis),
     ]
+    drawings = [figure() for figure in work.each(figures)]
     own = {**surroundings(), **checksums(path.parent, BESIDE)}
     page = template("diagnosis.html.jinja").render(
         title=title_of(diagnosis, recording),

@@ -7,6 +7,7 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
+from identification.progress import UNHEARD, Work
 from identification.recording import Recording
 from identification.response import FrequencyResponse
 from lab.result import Result
@@ -36,6 +37,7 @@ def write_report(
     scenario_text: str = "",
     command: str = "",
     facts: Mapping[str, str] | None = None,
+    work: Work = UNHEARD,
 ) -> None:
     """Writes one HTML file that needs no other; the same data give the same bytes.
 
@@ -46,6 +48,7 @@ def write_report(
         scenario_text: the scenario as written.
         command: how the lab was called.
         facts: further facts to reproduce the result, by name.
+        work: told of every figure.
     """
     path = Path(path)
     page = template("report.html.jinja").render(
@@ -57,7 +60,7 @@ def write_report(
         compared=_compared(result),
         modes=modes_table(result),
         **_matrices(result),
-        figures=[inline(drawing) for drawing in draw(result, recording)],
+        figures=[inline(drawing) for drawing in draw(result, recording, work)],
         explanation=result.explanation or " ".join(result.notes),
         warnings=result.warnings,
         command=command,

@@ -6,6 +6,7 @@ import re
 import shlex
 import subprocess
 import sys
+import threading
 from pathlib import Path
 
 import click
@@ -16,7 +17,7 @@ import pytest
 from identification.recording import Record
 from lab.cli import cli, main
 from lab.cli.colour import coloured
-from lab.cli.progress import CLEAR, Doing
+from lab.cli.progress import CLEAR, SHOW_CURSOR, Bar
 from lab.files.recording import load, save
 
 ROOT = Path(__file__).parents[2]
@@ -111,11 +112,13 @@ def test_a_terminal_sees_progress(bench, capsys, monkeypatch):
     monkeypatch.setattr("sys.stderr.isatty", lambda: True)
     assert status("run", "small.toml", "--out", "again", "--json") == 0
     printed = capsys.readouterr()
-    assert "simulating" in printed.err
+    for what in ("simulating", "identifying", "finding error bars", "writing the report"):
+        assert what in printed.err
     assert "100%" in printed.err
-    assert "identifying …" in printed.err
-    assert printed.err.endswith(CLEAR)
+    assert printed.err.endswith(CLEAR + SHOW_CURSOR)
     json.loads(printed.out)
+    assert status("run", "small.toml", "--out", "third", "--quiet") == 0
+    assert capsys.readouterr().err == ""
 
 
 def test_identify_finds_the_same_modes(finished, bench, capsys):
@@ -316,19 +319,29 @@ def test_view_opens_the_viewer(finished, monkeypatch):
     assert called == 2 * [[sys.executable, "-m", "rerun", str(finished / "run.rrd")]]
 
 
-def test_long_work_tells_for_how_long(capsys, monkeypatch):
+def test_a_bar_tells_the_time_left(capsys, monkeypatch):
     monkeypatch.setattr("sys.stderr.isatty", lambda: True)
-    clock = iter((0.0, 0.0, 61.5))
-    monkeypatch.setattr("lab.cli.progress.time.monotonic", lambda: next(clock))
-    doing = Doing(quiet=False)
-    with doing as show:
-        monkeypatch.setattr(doing, "clock", object())  # no thread draws between
-        show("placing")
-        doing._draw()
-        doing.clock = None
-    assert capsys.readouterr().err == f"{CLEAR}placing …{CLEAR}placing … 1:01"
-    with Doing(quiet=True) as show:
-        show("placing")
+    now = 0.0
+    monkeypatch.setattr("lab.cli.progress.time.monotonic", lambda: now)
+    with Bar(quiet=False) as bar:
+        monkeypatch.setattr(bar, "clock", threading.current_thread())  # no thread draws between
+        bar("calibrating", 0.0)
+        now = 30.0
+        bar("searching", 0.25)
+        assert "25%" in (seen := capsys.readouterr().err)
+        assert "1:30 left" in seen
+        # More work than was known of: a new bar, at a pace of its own.
+        now = 40.0
+        bar("searching again", 0.1)
+        assert "  0%" in (seen := capsys.readouterr().err)
+        assert "left" not in seen
+        now = 50.0
+        bar("searching again", 0.55)
+        assert "50%  0:10 left" in capsys.readouterr().err
+        bar.clock = None
+    assert capsys.readouterr().err == CLEAR + SHOW_CURSOR
+    with Bar(quiet=True) as bar:
+        bar("placing", 0.5)
     assert capsys.readouterr().err == ""
 
 

@@ -12,7 +12,7 @@ from lab.diagnosis.outcome import Errors, Prediction, Quantity, SpectralPredicti
 from lab.diagnosis_summary import diagnosis_summary
 from lab.effects import EFFECTS
 from lab.show.diagnosis_report import write_diagnosis_report
-from lab.show.figures.diagnosis import draw_diagnosis, predictions, worst_outputs
+from lab.show.figures.diagnosis import figures_of, predictions, worst_outputs
 from lab.show.findings import (
     alternative_table,
     calibration_table,
@@ -257,8 +257,13 @@ def test_text_from_data_stays_text(diagnosis, recording, tmp_path):
     assert sum("<script>alert(1)</script>" in data for data in parsed.text) >= 12
 
 
+def drawn(diagnosis, recording):
+    """The figures that the data support."""
+    return [each for figure in figures_of(diagnosis, recording) if (each := figure()) is not None]
+
+
 def test_figures_show_the_models_there_are(diagnosis, recording):
-    drawings = {each.name: each for each in draw_diagnosis(diagnosis, recording)}
+    drawings = {each.name: each for each in drawn(diagnosis, recording)}
     assert list(drawings) == ["prediction", "residual-time", "residual-frequency", "residual-amplitude"]
     for each in drawings.values():
         assert ">extended" in each.svg
@@ -276,7 +281,7 @@ def test_poor_data_are_drawn_too(diagnosis, recording):
     poor = replace(
         diagnosis, errors=Errors(0.0, math.nan, 0.0, 0.0), predictions=(Prediction(y, y, y, y, 6),)
     )
-    assert [each.name for each in draw_diagnosis(poor, short)] == [
+    assert [each.name for each in drawn(poor, short)] == [
         "prediction",
         "residual-time",
         "residual-amplitude",

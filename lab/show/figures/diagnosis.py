@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -37,21 +39,21 @@ FLOOR: dict[str, Any] = {"color": "black", "linestyle": (0, (3, 1, 1, 1)), "line
 FLOOR_SAYS = "The noise floor is drawn as the same share of the signal in every channel."
 
 
-def draw_diagnosis(diagnosis: Diagnosis, recording: Diagnosed) -> list[Drawing]:
-    """All figures that the data support, in the order of the report."""
+def figures_of(diagnosis: Diagnosis, recording: Diagnosed) -> list[Callable[[], Drawing | None]]:
+    """What draws each figure, where the data support it, in the order of the report."""
     if diagnosis.spectra is not None:
         from lab.show.figures.spectral import draw_spectra
 
-        return [draw_spectra(diagnosis, diagnosis.spectra)]
+        return [partial(draw_spectra, diagnosis, diagnosis.spectra)]
     assert isinstance(recording, Recording)  # responses are spectra, drawn above
     rows = worst_outputs(diagnosis)
-    drawings = [
-        predictions(diagnosis, recording, rows),
-        residuals_over_time(diagnosis, recording, rows),
-        residuals_over_frequency(diagnosis, recording, rows),
-        residuals_over_amplitude(diagnosis, recording, rows),
-    ]
-    return [each for each in drawings if each is not None]
+    figures = (
+        predictions,
+        residuals_over_time,
+        residuals_over_frequency,
+        residuals_over_amplitude,
+    )
+    return [partial(figure, diagnosis, recording, rows) for figure in figures]
 
 
 def worst_outputs(diagnosis: Diagnosis) -> list[int]:
