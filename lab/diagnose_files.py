@@ -8,7 +8,7 @@ from typing import Any
 
 from identification.progress import UNHEARD, Progress, Work
 from identification.response import FrequencyResponse
-from lab.diagnosis.calibrate import WIDTHS, parameters_of
+from lab.diagnosis.calibrate import WIDTHS, gain_names, parameters_of
 from lab.diagnosis.diagnose import diagnose
 from lab.diagnosis.outcome import Diagnosis
 from lab.diagnosis.spectral.diagnose import diagnose_spectra
@@ -130,7 +130,8 @@ def _named(path: str | Path, names: Names) -> Diagnosed:
 
 
 def _widths(given: Mapping[str, float], rig: Rig) -> Mapping[str, float]:
-    known = (*WIDTHS, *parameters_of(twin(rig)).names) if given else ()
+    model = twin(rig)
+    known = (*WIDTHS, "gain", *parameters_of(model).names, *gain_names(model))
     for name in given:
         if name not in known:
             raise UnknownNameError(

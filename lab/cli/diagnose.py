@@ -42,7 +42,8 @@ from lab.cli.shared import (
     multiple=True,
     metavar="NAME=SHARE,…",
     help="How far the model's own numbers may be off, relative, one standard deviation: of a group, as damping=0.5, or of "
-    "one parameter, as 'stiffness spring2_3=0.1' [default: mass=0.005,stiffness=0.02,damping=0.25].",
+    "one parameter, as 'stiffness spring2_3=0.1' or 'gain motor=0.14' [default: mass=0.005,stiffness=0.02,damping=0.25; "
+    "gains of inputs are known].",
 )
 @click.option(
     "--effects",

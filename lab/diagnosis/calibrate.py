@@ -47,13 +47,28 @@ class Calibration:
 
 
 def parameters_of(twin: Twin, widths: Mapping[str, float] | None = None) -> Parameters:
-    """The model's own parameters with their priors; `widths` by group or by name ("stiffness spring2_3")."""
+    """The model's own parameters with their priors; `widths` by group or by name ("stiffness spring2_3").
+
+    The gain of an input is a parameter where it has a width ("gain", "gain motor"); else it is known exactly.
+    """
     given = {**WIDTHS, **(widths or {})}
+
+    def width(name: str) -> float:
+        return given.get(name, given.get(name.partition(" ")[0], 0.0))
+
     names = [f"mass {b}" for b in twin.bodies]
     names += [f"{group} {s}" for group in ("stiffness", "damping") for s in twin.springs]
-    values = [given.get(name, given[name.split(" ")[0]]) for name in names]
+    gains = gain_names(twin)
+    inputs = tuple(i for i, name in enumerate(gains) if width(name))
+    names += [gains[i] for i in inputs]
+    values = np.array([width(name) for name in names])
     sizes = len(twin.bodies), len(twin.springs)
-    return Parameters(tuple(names), np.array(values, dtype=float), *sizes, np.eye(len(names)))
+    return Parameters(tuple(names), values, *sizes, np.eye(len(names)), inputs=inputs)
+
+
+def gain_names(twin: Twin) -> list[str]:
+    """Name of the gain of each input, as a parameter."""
+    return [f"gain {channel.name}" for channel in twin.plant.inputs]
 
 
 def calibrate(misfit: Misfit, rig: Rig, work: Work = UNHEARD) -> Calibration:
@@ -84,7 +99,7 @@ def calibrate(misfit: Misfit, rig: Rig, work: Work = UNHEARD) -> Calibration:
 
 def survey_of(misfit: Misfit, rig: Rig, theta: Array, residual: Array | None = None) -> Survey:
     """How strongly the test moves the model, and where its residual has tones."""
-    plant = misfit.twin.changed(*misfit.parameters.factors(theta))
+    plant = misfit.plant(theta)
     n = plant.n_dofs
     eye, zero = np.eye(n), np.zeros((n, n))
     probe = replace(

@@ -30,6 +30,7 @@ from lab.diagnosis.starts import best_starts, starts_of
 from lab.diagnosis.state import State
 from lab.diagnosis.unlearnable import unlearnable
 from lab.diagnosis.whiteness import Whiteness
+from lab.effects.actuator_gain import ActuatorGain
 from lab.effects.damping_change import DampingChange
 from lab.effects.edits import law_of, with_law, with_mass
 from lab.effects.effect import EVERYWHERE, Effect
@@ -178,7 +179,8 @@ def calibration_of(state: State) -> dict[str, Calibrated]:
     """Nominal and calibrated value of every parameter of the model, with the causes in it."""
     misfit, n = state.misfit, state.misfit.parameters.n_factors
     model = misfit.twin
-    nominal = np.concatenate([model.body_mass, model.stiffness, model.damping])
+    gains = np.ones(len(misfit.parameters.inputs))
+    nominal = np.concatenate([model.body_mass, model.stiffness, model.damping, gains])
     widths = misfit.parameters.widths[:n]
     factors = np.exp(state.fit.theta[:n] * widths)
     stds = nominal * factors * widths * np.sqrt(np.diag(state.fit.covariance)[:n])
@@ -187,7 +189,7 @@ def calibration_of(state: State) -> dict[str, Calibrated]:
 
 
 def calibrated_rig(misfit: Misfit, theta: Array, rig: Rig) -> Rig:
-    """The rig with its masses, stiffnesses and dampings at the parameters `theta`."""
+    """The rig with its masses, stiffnesses, dampings and gains at the parameters `theta`."""
     mass, stiffness, damping = misfit.parameters.factors(theta)
     original = rig
     for body, factor in zip(misfit.twin.bodies, mass, strict=True):
@@ -200,4 +202,7 @@ def calibrated_rig(misfit: Misfit, theta: Array, rig: Rig) -> Rig:
             stiffness=[float(k) * elastic[0], *elastic[1:]],
             damping=[float(c) * viscous[0], *viscous[1:]],
         )
+    gains = misfit.parameters.gains(theta)
+    for i, gain in zip(misfit.parameters.inputs, gains, strict=True):
+        rig = ActuatorGain(rig.inputs[i].name, relative_change=float(gain) - 1).apply(rig)
     return rig

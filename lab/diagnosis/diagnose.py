@@ -57,7 +57,8 @@ def diagnose(
         recording: measured outputs and inputs.
         rig: what the engineer believes; its channels must have the names of the recording's.
         baseline: of the same rig in its known state; it calibrates the model first.
-        widths: prior standard deviations, relative, by group ("mass", "stiffness", "damping") or parameter.
+        widths: prior standard deviations, relative, by group ("mass", "stiffness", "damping", "gain") or parameter; gains of
+            inputs are known exactly where no width is given.
         effects: the causes that may be named.
         progress: told what is being done, and the share of it that is done; it falls where the search goes on.
 

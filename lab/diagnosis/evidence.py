@@ -32,9 +32,12 @@ def minus_two_log_evidence(fit: Fit, *, free: Array | None = None) -> float:
         lifted += [row / np.linalg.norm(row) for row in np.atleast_2d(free)]
     loose = np.array(lifted).reshape(-1, n).T  # directions without a prior
     held = scipy.linalg.null_space(loose.T) if loose.size else np.eye(n)
+    told = np.arange(n) < fit.n_structural
+    n_told = float(np.sum(held[told] ** 2))
     best = np.inf
     for spread in SPREADS:
-        precision = held @ held.T / spread**2
+        widths = np.where(told, spread, 1.0)
+        precision = held @ (held.T / widths**2) @ held @ held.T
         A = information + precision
         d = np.linalg.lstsq(A, prior @ theta - precision @ theta, rcond=None)[0]
         inner = held.T @ A @ held
@@ -43,7 +46,7 @@ def minus_two_log_evidence(fit: Fit, *, free: Array | None = None) -> float:
             inner = inner - cross @ np.linalg.pinv(own, hermitian=True) @ cross.T
         # The local quadratic may not promise more than the prior made the fit pay.
         change = max(d @ information @ d - 2 * d @ prior @ theta, -(theta @ prior @ theta))
-        occam = np.linalg.slogdet(inner)[1] + 2 * held.shape[1] * np.log(spread)
+        occam = np.linalg.slogdet(inner)[1] + 2 * n_told * np.log(spread)
         doubt = (np.log(spread) / DOUBT) ** 2
         best = min(best, fit.deviance + change + (theta + d) @ precision @ (theta + d) + occam + doubt)
     variables = sum(max(cause.n, 1) for cause in fit.causes) + loose.shape[1]

@@ -36,6 +36,7 @@ class Fit:
         information: Gauss-Newton information of all variables without the prior, (n, n).
         precision: P, of the prior, (n_parameters, n_parameters).
         observer: gain that pulled the state to the measurements; no rows for the plain simulation error.
+        n_structural: parameters, the first, whose common spread the data tell; the widths of others are as stated.
     """
 
     theta: Array
@@ -45,6 +46,7 @@ class Fit:
     information: Array
     precision: Array
     observer: Array
+    n_structural: int
 
     @property
     def deviance(self) -> float:
@@ -208,4 +210,4 @@ def fit(
             if fresh:
                 break
             age = refresh
-    return Fit(theta, causes, e, f, information, P, observer)
+    return Fit(theta, causes, e, f, information, P, observer, misfit.parameters.n_structural)

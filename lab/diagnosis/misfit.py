@@ -79,10 +79,11 @@ class Parameters:
     Attributes:
         names: of the parameters.
         widths: one standard deviation of the logarithm of each factor, then the scale of each unknown of a start.
-        n_bodies, n_springs: masses come first, then stiffnesses, then dampings, then displacements and velocities at the
-            start of records that do not begin at rest.
+        n_bodies, n_springs: masses come first, then stiffnesses, then dampings, then gains of inputs, then displacements and
+            velocities at the start of records that do not begin at rest.
         precision: of the prior, in widths: the identity, but for starts and directions that were found to be wrong.
         started: numbers of the records that do not begin at rest.
+        inputs: numbers of the inputs whose gain is not known exactly.
     """
 
     names: tuple[str, ...]
@@ -91,6 +92,7 @@ class Parameters:
     n_springs: int
     precision: Array
     started: tuple[int, ...] = ()
+    inputs: tuple[int, ...] = ()
 
     @property
     def n(self) -> int:
@@ -99,15 +101,25 @@ class Parameters:
 
     @property
     def n_factors(self) -> int:
+        """Number of masses, stiffnesses, dampings and gains."""
+        return self.n_structural + len(self.inputs)
+
+    @property
+    def n_structural(self) -> int:
         """Number of masses, stiffnesses and dampings."""
         return self.n_bodies + 2 * self.n_springs
 
     def factors(self, theta: Array) -> tuple[Array, Array, Array]:
         """Factors on masses, stiffnesses and dampings at `theta`, in units of the prior's width."""
-        n = self.n_factors
+        n = self.n_structural
         factors = np.exp(np.clip(theta[:n] * self.widths[:n], -3, 3))
         a, b = self.n_bodies, self.n_bodies + self.n_springs
         return factors[:a], factors[a:b], factors[b:]
+
+    def gains(self, theta: Array) -> Array:
+        """Factors on the inputs whose gain is not known exactly, (n_gains,)."""
+        own = slice(self.n_structural, self.n_factors)
+        return np.asarray(np.exp(np.clip(theta[own] * self.widths[own], -3, 3)))
 
     def start(self, theta: Array, record: int) -> Array | None:
         """Displacements and velocities at the start of a record; None where it begins at rest."""
@@ -218,6 +230,8 @@ class Misfit:
     def plant(self, theta: Array, causes: Sequence[Hypothesis] = ()) -> Plant:
         """The plant at parameters `theta` with causes in it."""
         plant = self.twin.changed(*self.parameters.factors(theta))
+        for i, gain in zip(self.parameters.inputs, self.parameters.gains(theta), strict=True):
+            plant = plant.with_input(i, gain=gain * plant.input_paths[i].gain)
         for cause in sorted(causes, key=lambda cause: cause.kind.grows):
             assert self.survey is not None
             plant = cause.effect.explain(plant, self.survey)

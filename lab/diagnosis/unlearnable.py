@@ -16,6 +16,14 @@ NARROWED = 0.9
 EXACT = 1e-6
 """Two changes cancel when together they move all predictions less than this share of what one does: rounding leaves 1e-10."""
 FACTOR = 1.05
+CLOSER = "excite it more, or measure closer to it"
+GROUPS = {
+    "mass": ("every body", CLOSER),
+    "stiffness": ("every spring", CLOSER),
+    "damping": ("every spring", CLOSER),
+    "gain": ("every input", "weigh one body, or calibrate the input"),
+}
+"""What all of a group are called, and how to learn more of them."""
 
 
 def unlearnable(misfit: Misfit, fit: Fit) -> tuple[str, ...]:
@@ -28,16 +36,15 @@ def _left_to_the_prior(misfit: Misfit, fit: Fit) -> Iterator[str]:
     prior = np.diag(np.linalg.pinv(fit.precision, hermitian=True))
     posterior = np.diag(fit.covariance)[: fit.theta.size]
     wide = posterior > NARROWED**2 * prior
-    for group in ("mass", "stiffness", "damping"):
+    for group, (everyone, advice) in GROUPS.items():
         members = misfit.parameters.group(group)
         names = [misfit.parameters.names[j].partition(" ")[2] for j in members if wide[j]]
         if not names:
             continue
-        everyone = "every spring" if group != "mass" else "every body"
         whose = everyone if len(names) == len(members) > 1 else listed(names)
         yield (
             f"the {group} of {whose} cannot be learned from these data: it stays where the model and its tolerance put it; "
-            "excite it more, or measure closer to it"
+            f"{advice}"
         )
 
 
@@ -45,7 +52,7 @@ def _common_scales(misfit: Misfit, fit: Fit) -> Iterator[str]:
     """Scales of everything together that no reading shows, tried out."""
     parameters, plant = misfit.parameters, misfit.twin.plant
     scaled = fit.theta.copy()
-    n = parameters.n_bodies + 2 * parameters.n_springs
+    n = parameters.n_structural
     scaled[:n] += np.log(FACTOR) / parameters.widths[:n]
     as_it_is = misfit.residual(fit.theta)
     change = np.linalg.norm(misfit.residual(scaled) - as_it_is)

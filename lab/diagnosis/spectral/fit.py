@@ -48,6 +48,11 @@ class SpectralFit:
         total[: self.theta.size, : self.theta.size] += self.precision
         return np.asarray(np.linalg.pinv(total, rcond=1e-14, hermitian=True), dtype=np.float64)
 
+    @property
+    def n_structural(self) -> int:
+        """Parameters whose common spread the data tell: all of them."""
+        return self.theta.size
+
 
 @dataclass(frozen=True, eq=False)
 class Point:
