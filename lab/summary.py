@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 import textwrap
+from collections import Counter
 from collections.abc import Sequence
 
 import numpy as np
 
 from identification.recording import Array
-from lab.result import Result
+from lab.result import Result, Validation
 
 MAX_DOFS = 8
 """Matrices up to this size are printed entry by entry."""
@@ -18,8 +19,8 @@ WIDTH = 100
 
 
 def summary(result: Result) -> str:
-    """Matrices with their errors, modes beside the true ones, criteria and warnings, as lines of text."""
-    parts = [_headline(result), _matrices(result), _modes(result), _criteria(result)]
+    """Matrices with their errors, modes beside the true ones, criteria, validation and warnings, as lines of text."""
+    parts = [_headline(result), _matrices(result), _modes(result), _criteria(result), _validation(result)]
     parts += [textwrap.fill(result.explanation or " ".join(result.notes), WIDTH)]
     parts += ["\n".join(textwrap.fill(f"warning: {each}", WIDTH) for each in result.warnings)]
     return "\n\n".join(part for part in parts if part)
@@ -118,3 +119,22 @@ def _criteria(result: Result) -> str:
         verdict = "met   " if criterion.passed else "MISSED"
         lines.append(f"  {verdict} {criterion.name}: {value} (limit {criterion.limit:g})")
     return "\n".join(["criteria", *lines]) if lines else ""
+
+
+def _validation(result: Result) -> str:
+    """How the criteria of the field came out, and each that was not passed."""
+    if not result.validation:
+        return ""
+    counts = Counter(each.outcome for each in result.validation)
+    told = ", ".join(f"{counts[kind]} {kind}" for kind in ("pass", "fail", "undecided") if counts[kind])
+    return "\n".join(
+        [f"validation: {told}", *(_not_passed(each) for each in result.validation if each.outcome != "pass")]
+    )
+
+
+def _not_passed(each: Validation) -> str:
+    value = "not available" if each.value is None else f"{each.value:.3g}"
+    bar = "" if each.std is None else f" ± {each.std:.2g}"
+    side = "at least" if each.at_least else "at most"
+    text = f"  {each.outcome:<9} {each.name}: {value}{bar} ({side} {each.limit:.3g}; {each.where})"
+    return textwrap.fill(text, WIDTH, subsequent_indent=12 * " ")

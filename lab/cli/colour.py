@@ -16,6 +16,8 @@ STYLES: dict[str, dict[str, Any]] = {
     "Unexplained:": {"fg": "yellow", "bold": True},
     "  met ": {"fg": "green"},
     "  MISSED ": {"fg": "red", "bold": True},
+    "  fail ": {"fg": "red", "bold": True},
+    "  undecided ": {"fg": "yellow"},
     "fault ": {"fg": "red", "bold": True},
     "doubt ": {"fg": "yellow"},
 }

@@ -9,7 +9,7 @@ from identification.modes import Modes
 from identification.recording import Channel
 from identification.systems import Realization, SecondOrder, StateSpace
 from lab.compare import compare
-from lab.result import Criterion, Result
+from lab.result import Criterion, Result, Validation
 from lab.summary import summary
 
 
@@ -117,6 +117,25 @@ def test_fits_a_screen(n_dofs):
     text = summary(replace(found, **against(truth, found)))
     assert len(text.splitlines()) < 60
     assert max(map(len, text.splitlines())) <= 100
+
+
+def test_validation_counts_and_names_what_was_not_passed():
+    def judged(name, outcome, value, where):
+        return Validation(name, 0.9, True, value, None, outcome, where, "a standard")
+
+    long = "needs the model's masses and shapes at more points than modes"
+    validation = (
+        judged("frequency error of the lowest mode", "pass", 0.95, "mode 1"),
+        judged("MAC", "fail", 0.12345, "mode 2"),
+        judged("cross-orthogonality, same mode", "undecided", None, long),
+    )
+    text = summary(result(2, validation=validation))
+    lines = text.split("validation: ")[1].splitlines()
+    assert lines[0] == "1 pass, 1 fail, 1 undecided"
+    assert lines[1] == "  fail      MAC: 0.123 (at least 0.9; mode 2)"
+    assert lines[2].startswith("  undecided cross-orthogonality, same mode: not available (at least 0.9;")
+    assert max(map(len, text.splitlines())) <= 100
+    assert "validation" not in summary(result(2))
 
 
 def test_nothing_found():
