@@ -16,7 +16,7 @@ CLEAR = "\r\x1b[K"
 SHOW_CURSOR = "\x1b[?25h"
 """The bar hides it."""
 STEPS = 1000
-WIDEST = 34
+WIDEST = 30
 """Room for what is being done, so that the bar stays where it is."""
 FALL = 0.02
 """Of the share done, from which on a new bar begins."""
@@ -54,7 +54,7 @@ class Bar:
     def _begin(self, share: float, now: float) -> None:
         self.left = TimeLeft(share, now)
         self.bar = click.progressbar(
-            length=STEPS, show_eta=False, item_show_func=lambda _: self._info(), file=sys.stderr
+            length=STEPS, width=24, show_eta=False, item_show_func=lambda _: self._info(), file=sys.stderr
         )
 
     def _info(self) -> str:
