@@ -38,6 +38,7 @@ from lab.diagnosis.state import State
 from lab.diagnosis.words import FURTHER, advice, says
 from lab.effects import EFFECTS
 from lab.effects.effect import Effect
+from lab.errors import LabError
 from lab.rig import Rig
 from lab.twin import twin
 
@@ -88,6 +89,11 @@ def diagnose_spectra(
     )
     model = twin(rig)
     parameters = parameters_of(model, widths)
+    if parameters.inputs:
+        raise LabError(
+            f"a width is given for {parameters.names[-1]!r}, and the data are spectra; expected a recording with measured "
+            "forces, or responses whose scale is marked as unknown"
+        )
     if baseline is not None:
         work("calibrating on the baseline", 0.0)
         known = _calibrated(_experiment(baseline, rig, band, share=1.0), rig, parameters)
