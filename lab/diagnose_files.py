@@ -108,11 +108,12 @@ def present_diagnosis(
         facts: further facts to reproduce it, by name.
         work: told how much of this is done.
     """
+    loading, reporting, showing = work.called("writing the report").parts(1.5, 3.0, 1.0)
     # Imported here because drawing is slow to load and `lab` must come up without it.
     from lab.show.diagnosis_report import write_diagnosis_report
     from lab.show.rerun_log.diagnosis import write_diagnosis_rrd
 
-    reporting, showing = work.called("writing the report").parts(4.0, 1.0)
+    loading.done()
     save_diagnosis(diagnosis, folder / "diagnosis.json")
     diagnosis.extended.save(folder / "extended.xml")
     write_diagnosis_report(

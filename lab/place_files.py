@@ -86,9 +86,10 @@ def present_placement(
     from lab.show.rerun_log.placement import write_placement_rrd
 
     save_placement(placement, folder / "placement.json")
-    showing = work.parts(2.0, 1.0)[1]
+    loading, reporting, _ = work.parts(1.5, 1.0, 0.5)
+    loading.done()
     write_placement_report(folder / "report.html", placement, rig, command=command, facts=facts)
-    showing.done(0.0)
+    reporting.done()
     write_placement_rrd(folder / "run.rrd", placement, rig)
 
 
