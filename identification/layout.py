@@ -69,7 +69,7 @@ def layout(
         )
     if not known:
         raise NotSecondOrderError(
-            "no channel says which degree of freedom it reads or drives; set `dof` of the channels"
+            "no channel says which degree of freedom it reads or drives; set `dof` of the channels, in the recipe of the import"
         )
     outside = [dof for dof in known if dof not in names]
     if outside:

@@ -22,8 +22,8 @@ PAGE = (ROOT / "docs" / "import.md").read_text("utf-8")
 
 
 @pytest.fixture
-def truth(tmp_path, monkeypatch):
-    """A working folder with the universal file of a simulated test, in g and N, and the modes behind it."""
+def rig(tmp_path, monkeypatch):
+    """A working folder with the universal file of a simulated test, in g and N, and the rig behind it."""
     rig = lab.Rig.load(ROOT / "models" / "chain3_uncoupled.xml")
     rig = rig.connected(inputs=["force1", "force2"], outputs=["acc2.x", "acc3.x"])
     recording = lab.simulate(rig, lab.EXCITATIONS["pulse"](amplitude=1.0), sample_rate=20.0, duration=10.0)
@@ -37,11 +37,10 @@ def truth(tmp_path, monkeypatch):
     (tmp_path / "my_test.uff").write_bytes(b"".join(sets))
     save_responses(analysed(rig), tmp_path / "frf.h5")
     lab.export_file(tmp_path / "frf.h5", tmp_path / "my_frf.uff", what="data")
-    (tmp_path / "my_recipe.toml").write_text(
-        next(block for block in blocks(PAGE, "toml") if "force 1+X" in block)
-    )
+    for name, line in (("my_recipe.toml", 'column = "force 1+X"'), ("my_dofs.toml", 'name = "force 1+X"')):
+        (tmp_path / name).write_text(next(block for block in blocks(PAGE, "toml") if line in block))
     monkeypatch.chdir(tmp_path)
-    return rig.modes()
+    return rig
 
 
 def analysed(rig):
@@ -58,9 +57,9 @@ def analysed(rig):
 
 
 @pytest.mark.slow
-def test_the_commands_run_and_find_the_modes(truth, capsys):
+def test_the_commands_run_and_find_modes_and_matrices(rig, capsys):
     commands = [line for block in blocks(PAGE, "sh") for line in block.splitlines()]
-    assert len(commands) == 9
+    assert len(commands) == 11
     for command in commands:
         typed, _, remark = command.partition("#")
         with pytest.raises(SystemExit) as ended:
@@ -68,6 +67,15 @@ def test_the_commands_run_and_find_the_modes(truth, capsys):
         assert ended.value.code == (2 if "exit status 2" in remark else 0), capsys.readouterr().err
     start = Path("start.toml").read_text("utf-8")
     assert "acceleration 2+X" in start
+    truth = rig.modes()
+    matrices = read_document("out/with_dofs_modes/result.json", form="modal-result", version=1)[
+        "second_order"
+    ]
+    order = [matrices["dofs"].index(dof) for dof in ("x1", "x2", "x3")]
+    # Each entry follows from the squares of poles that are known to 1e-5.
+    np.testing.assert_allclose(
+        np.array(matrices["stiffness"])[np.ix_(order, order)], rig.second_order().stiffness, rtol=1e-4
+    )
     found = read_document("out/my_test/result.json", form="modal-result", version=1)["modes"]
     known = read_document("known_modes.json", form="modal-result", version=1)["modes"]
     # Simulated to a relative 1e-9 or so, through which ERA sees the poles to 1e-6; the universal file keeps six digits.
@@ -93,7 +101,7 @@ def test_the_commands_run_and_find_the_modes(truth, capsys):
 
 def test_the_recipes_are_sound(tmp_path):
     tables = blocks(PAGE, "toml")
-    assert len(tables) == 4
+    assert len(tables) == 5
     for table in tables:
         if "[channels]" in table:
             (tmp_path / "points.toml").write_text(table)
