@@ -70,7 +70,8 @@ def place_diagnosis(
     compared = Compared(rig, plan, everything, sensors, actuators, n_sensors, n_actuators, limit)
     comparing.done(0.0)
     compared.search(comparing)
-    telling.done(0.0)
+    ranked, driven = telling.parts(1.0, 3.0)
+    ranked.done(0.0)
     chosen, acting = compared.best
     values = np.sort(np.array(list(compared.figures.values()))) if compared.proven else np.zeros(0)
     layouts = [("best", compared.best, compared.arena)]
@@ -82,6 +83,7 @@ def place_diagnosis(
         layouts.append(("worst", last, everything.under(rig, plan, actuators.channels_of(last[1]))))
     layouts.append(("all sensors", (tuple(range(len(sensors))), acting), compared.arena))
     ranking = [_ranked(name, layout, arena, sensors, actuators, values) for name, layout, arena in layouts]
+    driven.done(0.0)
     channels = sensors.channels_of(chosen)
     return Placement(
         "diagnosis",
@@ -97,7 +99,7 @@ def place_diagnosis(
         compared.n_layouts,
         values,
         tuple(ranking),
-        drives=tuple(_drives(compared, channels)),
+        drives=tuple(_drives(compared, channels, driven)),
         causes=tuple(_told(compared.arena, channels)),
         inseparable=tuple(_named(everything, group) for group in groups(compared.inseparable())),
         warnings=tuple(_warnings(compared, size)),
@@ -131,10 +133,11 @@ def _named(arena: Arena, group: Sequence[int]) -> tuple[str, ...]:
     return tuple(" at ".join(arena.keys[i]) for i in group)
 
 
-def _drives(compared: Compared, channels: Sequence[int]) -> Iterator[Drive]:
+def _drives(compared: Compared, channels: Sequence[int], work: Work) -> Iterator[Drive]:
     """Other signals, and other levels of the planned one; causes of the same physical size, noise as planned."""
     rig, plan, acting = compared.rig, compared.plan, compared.actuators.channels_of(compared.best[1])
-    for name, other in alternatives(rig, plan, rig.second_order().modes().frequency_hz, acting):
+    others = list(alternatives(rig, plan, rig.second_order().modes().frequency_hz, acting))
+    for name, other in work.each(others):
         signals = other.signals(rig, acting)
         value = compared.arena.driven(rig, other, acting, compared.arena.noise_std).figure(channels)
         yield Drive(name, total_duration(signals, other.sample_rate), peak(signals), value)

@@ -117,7 +117,7 @@ def place_matrices(
         len(layouts) if n_layouts <= LOOKED_AT else n_layouts,
         np.sort(finite),
         tuple(ranking),
-        drives=tuple(_drives(contest, best)),
+        drives=tuple(_drives(contest, best, telling)),
         warnings=tuple(_warnings(contest, n_layouts, proven)),
     )
 
@@ -153,7 +153,7 @@ def _ranked(name: str, contest: Contest, layout: Layout, figures: Array) -> Rank
     )
 
 
-def _drives(contest: Contest, best: Layout) -> Iterator[Drive]:
+def _drives(contest: Contest, best: Layout, work: Work) -> Iterator[Drive]:
     """The best layout under other signals of the same largest force, with the noise that it has in the planned test."""
     rig, plan = contest.rig, contest.plan
     inputs, outputs = contest.actuators.channels_of(best[1]), contest.sensors.channels_of(best[0])
@@ -166,7 +166,7 @@ def _drives(contest: Contest, best: Layout) -> Iterator[Drive]:
         inputs=[rig.inputs[i].name for i in inputs], outputs=[rig.outputs[i].name for i in outputs]
     )
     structure, unknown = rig.second_order(), free_matrices(rig.dofs)
-    for kind, other in alternatives(rig, plan, structure.modes().frequency_hz, inputs):
+    for kind, other in work.each(list(alternatives(rig, plan, structure.modes().frequency_hz, inputs))):
         signals = [(name, u[inputs]) for name, u in other.signals(rig, inputs)]
         test = planned_test(
             [u for _, u in signals], known.inputs, known.outputs, sample_rate=other.sample_rate

@@ -12,6 +12,7 @@ import pytest
 from identification.recording import Recording
 from identification.response import FrequencyResponse
 from lab.catalogue import find
+from lab.cli.progress import CLEAR, SHOW_CURSOR
 from lab.diagnose_files import diagnose_file
 from lab.diagnosis.outcome import Diagnosis
 from lab.effects import EFFECTS
@@ -39,7 +40,7 @@ class StandIn:
         self.asked.append((recording, rig, baseline))
         self.widths, self.effects = widths, effects
         if progress is not None:
-            progress("searching for causes")
+            progress("searching for causes", 0.5)
         return explained(rig, recording)
 
 
@@ -149,8 +150,8 @@ def test_a_terminal_sees_what_is_being_done(engine, bench, capsys, monkeypatch):
     monkeypatch.setattr("sys.stderr.isatty", lambda: True)
     assert status(*ASKED, "--out", "out", "--json") == 0
     printed = capsys.readouterr()
-    assert "searching for causes …" in printed.err
-    assert printed.err.endswith("\r\x1b[K")
+    assert "searching for causes" in printed.err
+    assert printed.err.endswith(CLEAR + SHOW_CURSOR)
     json.loads(printed.out)
 
 
