@@ -156,12 +156,12 @@ def frequency_response(
         recording.dt,
         recording.inputs,
         recording.outputs,
-        multiple_coherence(moments) if known else None,
-        residual_variance(moments, n) if known else None,
-        line_weight(moments),
-        n,
-        decay,
-        notes,
+        coherence=multiple_coherence(moments) if known else None,
+        variance=residual_variance(moments, n) if known else None,
+        weight=line_weight(moments),
+        n_averages=n,
+        decay=decay,
+        notes=notes,
     )
 
 
