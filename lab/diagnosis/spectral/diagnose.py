@@ -99,7 +99,7 @@ def diagnose_spectra(
         known = _calibrated(_experiment(baseline, rig, band, share=1.0), rig, parameters)
         rig = calibrated_rig(known.likelihood, known.fit.theta, rig)
         parameters, model = _tightened(parameters, known.fit), twin(rig)
-    work("calibrating", 0.1)
+    work("calibrating", 0.05)
     stage = origin = _calibrated(_experiment(data, rig, band), rig, parameters)
     visible = {name: kind for name, kind in effects.items() if name in stage.experiment.visible}
     given = _as_given(stage.likelihood, stage.fit)
@@ -108,7 +108,7 @@ def diagnose_spectra(
     looks = 1
     while len(stage.accepted) < MOST_FINDINGS:
         number = FURTHER.get(len(stage.accepted), "first")
-        work(f"searching for a {number} cause", 0.0 if stage.accepted else 0.25)
+        work(f"searching for a {number} cause", 0.0 if stage.accepted else 0.45)
         ranked, looks = _ranked(stage, visible, given if not stage.accepted else None)
         if not ranked or ranked[0].gain < evidence_threshold(looks):
             break
@@ -121,7 +121,7 @@ def diagnose_spectra(
             refused = ranked[0]
             break
         first, stage = first or ranked, without_idle(step)
-    work("predicting data kept aside", 0.85)
+    work("predicting data kept aside", 0.75)
     told = _outcome(stage, origin, given, nominal, rig, first, refused)
     return replace(told, unlearnable=_too_small(stage, visible, evidence_threshold(looks)))
 
