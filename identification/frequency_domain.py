@@ -39,6 +39,10 @@ LINE_VALUES = 60
 MARGIN = 2.0
 """Upper edge of the band fitted, over the frequency of the highest peak and over that where it has faded."""
 
+LINES_PER_POLE = 5
+"""Fewest measured lines for each oscillating pole of the highest degree, unless told otherwise: noise is alike at
+neighbouring lines, and with more poles it splits those of the structure in two."""
+
 MAX_REFERENCES = 8
 """Outputs taken as references unless told otherwise; more of them leave a lower degree to each."""
 
@@ -65,7 +69,7 @@ def plscf_recording(
         recording: any kind of records.
         order: number of states; all degrees are tried when None.
         orders: as for `plscf`.
-        degree: as for `plscf`.
+        degree: as for `plscf`; with forces, when None, low enough for `LINES_PER_POLE`.
         band: lowest and highest frequency fitted [Hz]; `resonance_band` when None, and all lines when the data
             are free of noise.
         estimator: as for `frequency_response`; of no account without forces. Random records with H1 go through
@@ -85,11 +89,16 @@ def plscf_recording(
     Source: Peeters, Van der Auweraer, Guillaume and Leuridan (2004), Shock Vib. 11, 395-409; for outputs
         alone Peeters and Van der Auweraer (2005), Proc. 1st IOMAC.
     """
+    orders = None if orders is None else list(orders)
     forced = bool(recording.inputs) and all(record.inputs.shape[0] for record in recording.records)
     if forced:
         response, why = _forced_response(recording, estimator, n_segment, decay), "as asked for"
-        if band is None and response_rank(response) is None:
-            band, why = resonance_band(response), "no resonance lies above"
+        if response_rank(response) is None:
+            if band is None:
+                band, why = resonance_band(response), "no resonance lies above"
+            if degree is None:
+                inside = response if band is None else response.between(*band)
+                degree = _sparse_degree(inside, [*(orders or ()), *(() if order is None else (order,))])
     else:
         peaks = resonance_peaks(recording)
         response, why = _output_response(recording, peaks, references, n_lags, decay), "as asked for"
@@ -110,6 +119,13 @@ def plscf_recording(
         "n_lags": round(1 / (response.frequency_hz[1] * recording.dt)),
     }
     return replace(found, systems=systems, settings=settings, notes=(*notes, *found.notes))
+
+
+def _sparse_degree(response: FrequencyResponse, orders: Sequence[int]) -> int:
+    """Highest degree with `LINES_PER_POLE`, or what the orders asked for need."""
+    n_lines, n_inputs = response.frequency_hz.size, len(response.inputs)
+    sparse = max(2 * n_lines // (LINES_PER_POLE * n_inputs), 1)
+    return max(min(default_degree(n_lines, n_inputs), sparse), -(-max(orders, default=1) // n_inputs))
 
 
 def _forced_response(

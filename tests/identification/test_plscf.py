@@ -18,6 +18,7 @@ from identification.recording import Channel, Record, Recording
 from identification.response import FrequencyResponse
 from identification.second_order import second_order
 from identification.spectra import frequency_response, positive_spectra
+from identification.spectral_scatter import values_near
 from identification.stability import stabilize
 from identification.systems import SecondOrder
 from tests import systems
@@ -270,6 +271,24 @@ def test_the_band_reaches_above_the_resonances_and_no_further():
             assert 4 * highest > 0.5 / model.dt, name
         else:
             assert 1.1 * highest < band[1] < 6 * highest, name
+
+
+def test_noise_does_not_split_the_poles_of_a_short_record_in_two():
+    system = systems.paper_chain3()
+    modes = system.modes()
+    truth = np.concatenate([modes.frequency_hz, modes.damping_ratio])
+    errors = {None: [], 32: []}
+    for seed in range(24):
+        rng = np.random.default_rng([11, seed])
+        record = systems.with_noise(systems.recorded(system, [rng.standard_normal((2, 1200))]), 0.05, rng)
+        for degree, found in errors.items():
+            model = plscf_recording(record, 6, degree=degree).system
+            found.append(values_near(modes.poles, model.modes()) - truth)
+    chosen, highest = (np.sqrt(np.nanmean(np.square(found), axis=0)) for found in errors.values())
+    # Of two poles beside each other the strongest is sometimes taken and sometimes the other. Over 24 tests a ratio of RMS
+    # errors, of the same noise, is known to less than 20 %, the mean of six to a good 8 %.
+    assert np.all(np.isfinite(errors[None]))
+    assert np.exp(np.mean(np.log(chosen / highest))) < 0.9
 
 
 def test_a_band_holds_its_own_modes():
