@@ -88,8 +88,9 @@ def fdd(
         RecordingError: a sample is missing.
         TooShortError: no record is as long as `n_segment`.
 
-    Source: Brincker, Zhang and Andersen (2001), Smart Mater. Struct. 10, 441-445 (FDD); Brincker, Ventura
-        and Andersen (2001), Proc. 19th IMAC (enhanced FDD).
+    Source: Brincker, Zhang and Andersen (2001), Smart Mater. Struct. 10, 441-445 (FDD): G(f) = U S Uᴴ at each
+        line; Brincker, Ventura and Andersen (2001), Proc. 19th IMAC (enhanced FDD): log of the correlation of a bell
+        = λ t + constant.
     """
     return decomposition(cross_spectra(recording, n_segment=n_segment, zero_padding=2), min_mac=min_mac)
 
@@ -160,7 +161,7 @@ def efdd(
         OrderError: an odd order, or more modes than peaks.
         IdentificationError: no peak stands out.
 
-    Source: Brincker, Ventura and Andersen (2001), Proc. 19th IMAC.
+    Source: as for `fdd`.
     """
     found = fdd(recording, n_segment=n_segment, min_mac=min_mac)
     if not found.bells:

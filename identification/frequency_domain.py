@@ -86,8 +86,8 @@ def plscf_recording(
     Raises:
         IdentificationError: as for `frequency_response`, `positive_spectra` and `plscf`.
 
-    Source: Peeters, Van der Auweraer, Guillaume and Leuridan (2004), Shock Vib. 11, 395-409; for outputs
-        alone Peeters and Van der Auweraer (2005), Proc. 1st IOMAC.
+    Source: as for `plscf`; for outputs alone, with `positive_spectra` in the place of H, Peeters and Van der Auweraer
+        (2005), Proc. 1st IOMAC, section 3.
     """
     orders = None if orders is None else list(orders)
     forced = bool(recording.inputs) and all(record.inputs.shape[0] for record in recording.records)

@@ -52,8 +52,7 @@ def identify_responses(
     Raises:
         IdentificationError: another method, or responses that cannot be fitted.
 
-    Source: Peeters, Van der Auweraer, Guillaume and Leuridan (2004), Shock Vib. 11, 395-409; for M, C_d and K De Angelis
-        et al. (2002), J. Appl. Mech. 69, eq. (18).
+    Source: as for `plscf`; for M, C_d and K De Angelis et al. (2002), J. Appl. Mech. 69, eq. (18).
     """
     if method not in (None, METHOD):
         raise IdentificationError(

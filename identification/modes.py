@@ -150,7 +150,7 @@ def auto_mac(shapes: Complex) -> Array:
     Returns:
         Ones on the diagonal.
 
-    Source: Allemang (2003), Sound Vib. 37(8), 14-21.
+    Source: Allemang (2003), Sound Vib. 37(8), 14-21: |φ_iᴴ φ_j|² / (φ_iᴴ φ_i · φ_jᴴ φ_j).
     """
     return mac(shapes, shapes)
 
@@ -287,6 +287,6 @@ def real_shapes(shapes: Complex) -> Array:
         Real numbers of the same shape.
 
     Source: Ahmadian, Gladwell and Ismail (1995), J. Sound Vib. 182(4): of all turned copies it has the largest
-    real part.
+    real part, and that is where the phase of Σφ² = 0.
     """
     return np.asarray((shapes * np.exp(-1j * mean_phase(shapes))).real)

@@ -67,7 +67,8 @@ def plscf(
         IdentificationError: no line lies in the band.
 
     Source: Guillaume, Verboven, Vanlanduit, Van der Auweraer and Peeters (2003), Proc. 21st IMAC; Peeters,
-        Van der Auweraer, Guillaume and Leuridan (2004), Shock Vib. 11, 395-409.
+        Van der Auweraer, Guillaume and Leuridan (2004), Shock Vib. 11, 395-409: H = N D⁻¹ with polynomials in z, by
+        least Σ |w (N_o - H_o D)|² over lines and outputs o; the poles are the zeros of det D.
     """
     circle = Circle(response.dt, *(all_lines(response) if band is None else band))
     if band is not None:

@@ -98,7 +98,8 @@ def stabilize(realization: Realization, **thresholds: float) -> Stabilization:
     Raises:
         IdentificationError: there is no threshold of that name.
 
-    Source: the comparison of orders is that of Peeters and De Roeck (2001), J. Dyn. Syst. Meas. Control 123.
+    Source: Peeters and De Roeck (2001), J. Dyn. Syst. Meas. Control 123, the stabilization diagram: from one order to
+        the next |Δf| / f, |Δζ| / ζ and 1 - MAC stay within tolerances.
     """
     names = [field.name for field in fields(Thresholds)]
     unknown = sorted(set(thresholds) - set(names))

@@ -2,6 +2,7 @@
 
 import ast
 import inspect
+import re
 from pathlib import Path
 
 import pytest
@@ -81,6 +82,15 @@ def test_a_class_says_what_it_is_and_so_do_its_methods(node):
             said = parts(method)
             assert said[""].strip(), f"{node.name}.{method.name} has no docstring"
             assert not raises(method) or "Raises" in said, f"{node.name}.{method.name} has no Raises"
+
+
+@pytest.mark.parametrize(
+    "name", [n for n in identification.__all__ if inspect.isfunction(getattr(identification, n))]
+)
+def test_the_source_of_what_is_offered_names_its_equation(name):
+    source = inspect.getdoc(getattr(identification, name)).partition("Source:")[2]
+    # By number, or in symbols; a chain of sources ends in one.
+    assert re.search(r"eqs?\. \(|section|ch\. |=|Σ|Δ|φ|as for `", source), source
 
 
 def test_no_exception_is_outdated():
