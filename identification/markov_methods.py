@@ -61,159 +61,32 @@ MARKOV_METHODS: dict[str, Callable[..., Realization]] = {
 """Name -> function(markov, order, *, orders, …) -> Realization."""
 
 
-def era_recording(
+def realize_pulses(
+    name: str,
     recording: Recording,
     order: int | None = None,
     *,
     orders: Iterable[int] | None = None,
-    form: str = "balanced",
-    n_rows: int | None = None,
-    n_columns: int | None = None,
+    **settings: Any,
 ) -> Realization:
-    """Models from unit pulses or free decays: `markov_parameters`, then `era` at every order.
+    """Models from unit pulses or free decays: `markov_parameters`, then a method of `MARKOV_METHODS` at every order.
 
     Args:
+        name: of the method.
         recording: records of kind `pulse` or `free_decay`.
         order: number of states; chosen from the singular values when None.
         orders: further orders; when both are None and there is noise, up to twice the order chosen.
-        form: as for `era`.
-        n_rows: as for `era`.
-        n_columns: as for `era`.
+        settings: as for the method.
 
     Returns:
-        Models of all orders, and the singular values of the Hankel matrix.
+        Models of all orders, and the singular values that tell the order.
 
     Raises:
         RecordingError: the records are neither pulses nor free decays.
         OrderError: an order exceeds the rank of the data.
 
-    Source: Juang and Pappa (1985), J. Guidance 8(5).
+    Source: as for `markov_parameters`, and that of the method.
     """
-    return _realized("era", recording, order, orders, form=form, n_rows=n_rows, n_columns=n_columns)
-
-
-def era_dc_recording(
-    recording: Recording,
-    order: int | None = None,
-    *,
-    orders: Iterable[int] | None = None,
-    n_rows: int | None = None,
-    n_columns: int | None = None,
-    n_shifts: int = 10,
-    step: int | None = None,
-    first: int = 0,
-) -> Realization:
-    """Models from unit pulses or free decays: `markov_parameters`, then `era_dc` at every order.
-
-    Args:
-        recording: as for `era_recording`.
-        order: likewise.
-        orders: likewise.
-        n_rows: as for `era_dc`.
-        n_columns: as for `era_dc`.
-        n_shifts: as for `era_dc`.
-        step: as for `era_dc`.
-        first: as for `era_dc`.
-
-    Returns:
-        Models of all orders, and the singular values of the matrix of correlations.
-
-    Raises:
-        IdentificationError: as for `era_recording`.
-
-    Source: Juang, Cooper and Wright (1988), Control Theory Adv. Technol. 4(1), 5-14.
-    """
-    size = {"n_rows": n_rows, "n_columns": n_columns, "n_shifts": n_shifts, "step": step, "first": first}
-    return _realized("era_dc", recording, order, orders, **size)
-
-
-def itd_recording(
-    recording: Recording,
-    order: int | None = None,
-    *,
-    orders: Iterable[int] | None = None,
-    n_rows: int | None = None,
-    n_columns: int | None = None,
-) -> Realization:
-    """Models from unit pulses or free decays: `markov_parameters`, then `itd_real` at every order.
-
-    Args:
-        recording: as for `era_recording`.
-        order: likewise.
-        orders: likewise.
-        n_rows: as for `itd_real`.
-        n_columns: as for `itd_real`.
-
-    Returns:
-        Models of all orders, and the singular values of the Hankel matrix.
-
-    Raises:
-        IdentificationError: as for `era_recording`.
-
-    Source: Ibrahim and Mikulcik (1977), Shock Vib. Bull. 47(4); Juang (1992), thesis, eq. (4.8) to (4.11).
-    """
-    return _realized("itd", recording, order, orders, n_rows=n_rows, n_columns=n_columns)
-
-
-def mrtd_recording(
-    recording: Recording,
-    order: int | None = None,
-    *,
-    orders: Iterable[int] | None = None,
-    n_rows: int | None = None,
-    n_columns: int | None = None,
-) -> Realization:
-    """Models from unit pulses or free decays: `markov_parameters`, then `mrtd_real` at every order.
-
-    Args:
-        recording: as for `era_recording`.
-        order: likewise.
-        orders: likewise.
-        n_rows: as for `era`.
-        n_columns: as for `era`.
-
-    Returns:
-        Models of all orders, and the singular values of the Hankel matrix.
-
-    Raises:
-        IdentificationError: as for `era_recording`.
-
-    Source: Juang (1992), thesis, eq. (4.23), (4.27) and (5.2).
-    """
-    return _realized("mrtd", recording, order, orders, n_rows=n_rows, n_columns=n_columns)
-
-
-def mmrtd_recording(
-    recording: Recording,
-    order: int | None = None,
-    *,
-    orders: Iterable[int] | None = None,
-    n_rows: int | None = None,
-    n_columns: int | None = None,
-) -> Realization:
-    """Models from unit pulses or free decays: `markov_parameters`, then `mmrtd_real` at every order.
-
-    Args:
-        recording: as for `era_recording`.
-        order: likewise.
-        orders: likewise.
-        n_rows: as for `era`.
-        n_columns: as for `era`.
-
-    Returns:
-        Models of all orders, and the singular values of the Hankel matrix.
-
-    Raises:
-        IdentificationError: as for `era_recording`.
-
-    Source: Juang (1992), thesis, eq. (4.59), (4.64) and (5.4).
-    """
-    return _realized("mmrtd", recording, order, orders, n_rows=n_rows, n_columns=n_columns)
-
-
-def _realized(
-    name: str, recording: Recording, order: int | None, orders: Iterable[int] | None, **settings: Any
-) -> Realization:
     markov = markov_parameters(recording)
 
     def realize(order: int | None, orders: Iterable[int] | None) -> Realization:

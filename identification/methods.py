@@ -10,14 +10,7 @@ from typing import Any
 from identification.errors import IdentificationError
 from identification.fdd import efdd
 from identification.frequency_domain import plscf_recording
-from identification.markov_methods import (
-    around_the_order,
-    era_dc_recording,
-    era_recording,
-    itd_recording,
-    mmrtd_recording,
-    mrtd_recording,
-)
+from identification.markov_methods import MARKOV_METHODS, around_the_order, realize_pulses
 from identification.next_era import next_era
 from identification.okid import okid_era
 from identification.recording import Recording
@@ -70,7 +63,18 @@ class Method:
                 f"method {self.name!r} needs the forces and a record has no inputs; "
                 "take a method for outputs alone, such as ssi_cov"
             )
+        return self._models(recording, order, settings)
+
+    def _models(self, recording: Recording, order: int | None, settings: dict[str, Any]) -> Realization:
         return self.function(recording, order, **settings)
+
+
+@dataclass(frozen=True)
+class PulseMethod(Method):
+    """A way from the responses to unit pulses, or from free decays; its function takes Markov parameters."""
+
+    def _models(self, recording: Recording, order: int | None, settings: dict[str, Any]) -> Realization:
+        return realize_pulses(self.name, recording, order, **settings)
 
 
 def okid_era_recording(
@@ -107,17 +111,15 @@ def okid_era_recording(
     return around_the_order(realize, order, orders)
 
 
+def _on_pulses(name: str, summary: str) -> Method:
+    kinds = ("pulse", "free_decay")
+    return PulseMethod(name, MARKOV_METHODS[name], False, True, kinds, summary)
+
+
 METHODS = {
     method.name: method
     for method in (
-        Method(
-            name="era",
-            function=era_recording,
-            needs_inputs=False,
-            finds_order=True,
-            kinds=("pulse", "free_decay"),
-            summary="Eigensystem realization, from the response to unit pulses or from free decays.",
-        ),
+        _on_pulses("era", "Eigensystem realization, from the response to unit pulses or from free decays."),
         Method(
             name="okid_era",
             function=okid_era_recording,
@@ -126,37 +128,16 @@ METHODS = {
             kinds=("impact", "random", "burst_random", "sweep", "multisine", "other"),
             summary="Observer and eigensystem realization, from any forces and the response to them.",
         ),
-        Method(
-            name="era_dc",
-            function=era_dc_recording,
-            needs_inputs=False,
-            finds_order=True,
-            kinds=("pulse", "free_decay"),
-            summary="Eigensystem realization of data correlations, from the response to pulses or from free decays.",
+        _on_pulses(
+            "era_dc",
+            "Eigensystem realization of data correlations, from the response to pulses or from free decays.",
         ),
-        Method(
-            name="itd",
-            function=itd_recording,
-            needs_inputs=False,
-            finds_order=True,
-            kinds=("pulse", "free_decay"),
-            summary="Ibrahim time domain, from the response to pulses or from free decays.",
+        _on_pulses("itd", "Ibrahim time domain, from the response to pulses or from free decays."),
+        _on_pulses(
+            "mrtd", "Multiple-reference time domain, which is eigensystem realization in output-normal form."
         ),
-        Method(
-            name="mrtd",
-            function=mrtd_recording,
-            needs_inputs=False,
-            finds_order=True,
-            kinds=("pulse", "free_decay"),
-            summary="Multiple-reference time domain, which is eigensystem realization in output-normal form.",
-        ),
-        Method(
-            name="mmrtd",
-            function=mmrtd_recording,
-            needs_inputs=False,
-            finds_order=True,
-            kinds=("pulse", "free_decay"),
-            summary="Modified multiple-reference time domain, which is the same in input-normal form.",
+        _on_pulses(
+            "mmrtd", "Modified multiple-reference time domain, which is the same in input-normal form."
         ),
         Method(
             name="ssi_cov",
