@@ -190,6 +190,7 @@ def fit(
                 scaled = H + damping * np.diag(np.diag(H)) + 1e-12 * np.trace(H) * np.eye(size)
                 d = np.zeros(size)
                 d[free] = -np.linalg.solve(scaled[np.ix_(free, free)], g[free])
+                d *= misfit.parameters.allowed(d[:n])
                 trial, trial_causes = theta + d[:n], moved_by(causes, d[n:])
                 trial_e = misfit.residual(trial, trial_causes, observer=observer, n_train=n_train)
                 trial_f = objective(trial_e, trial, P, misfit.colour)

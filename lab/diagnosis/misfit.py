@@ -109,6 +109,11 @@ class Parameters:
         """Number of masses, stiffnesses and dampings."""
         return self.n_bodies + 2 * self.n_springs
 
+    def allowed(self, step: Array) -> float:
+        """Share of a step (n,) that changes no factor by more than e: a line through its logarithm tells nothing of farther."""
+        longest = np.max(np.abs(step[: self.n_factors] * self.widths[: self.n_factors]), initial=0.0)
+        return float(1 / max(longest, 1.0))
+
     def factors(self, theta: Array) -> tuple[Array, Array, Array]:
         """Factors on masses, stiffnesses and dampings at `theta`, in units of the prior's width."""
         n = self.n_structural
