@@ -12,10 +12,12 @@ from identification.recording import Array
 from lab.diagnosis.fit import Fit, fit, objective
 from lab.diagnosis.misfit import Hypothesis, Misfit
 from lab.diagnosis.starts import best_starts
+from lab.effects import EFFECTS
 from lab.effects.effect import EVERYWHERE, Effect
 from lab.effects.missing_spring import MissingSpring
 
 OWN_PARAMETERS = {"mass": "mass_change", "stiffness": "stiffness_change", "damping": "damping_change"}
+OWN_CHANGES = {cause: EFFECTS[cause] for cause in OWN_PARAMETERS.values()}
 FACTORS = np.geomspace(1 / 4, 4, 28)
 """So close that a lightly damped resonance is not stepped over in a window of ten swings."""
 DAMPING_FACTORS = np.geomspace(1 / 16, 16, 16)

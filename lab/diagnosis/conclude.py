@@ -102,6 +102,7 @@ def conclude(
     first: Sequence[Candidate],
     left: Whiteness,
     known: Baseline | None,
+    refused: Candidate | None,
     work: Work = UNHEARD,
 ) -> Diagnosis:
     """What a diagnosis tells: findings with their sizes, alternatives, the extended model, and the gain on data kept aside.
@@ -114,6 +115,7 @@ def conclude(
         first: candidates of the first search.
         left: whether what remains is noise.
         known: what the baseline taught.
+        refused: cause that the data ask for and that may not be named.
         work: told how much of this is done.
     """
     causes = effects_of(state)
@@ -139,6 +141,9 @@ def conclude(
     elif not left.passed:
         verdict = UNEXPLAINED
         warnings.append(words.left_over(left, recording))
+    if refused is not None:
+        verdict = UNEXPLAINED
+        warnings.append(words.not_to_be_named(refused.cause, refused.location))
     alternatives = _alternatives(first) if findings else ()
     warnings += words.inseparable(alternatives)
     return Diagnosis(

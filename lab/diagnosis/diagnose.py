@@ -12,6 +12,7 @@ from identification.recording import Recording
 from lab.diagnosis.baseline import Baseline
 from lab.diagnosis.calibrate import Calibration, calibrate, parameters_of, survey_of
 from lab.diagnosis.candidate import Candidate
+from lab.diagnosis.changes import OWN_CHANGES
 from lab.diagnosis.conclude import calibrated_rig, conclude
 from lab.diagnosis.evidence import minus_two_log_evidence
 from lab.diagnosis.fit import Fit, fit
@@ -95,6 +96,7 @@ def diagnose(
     state = State(calibration, found, (), found, (held_out_error(calibration.misfit, found),))
     inputs = misfit.driven
     first: list[Candidate] = []
+    refused: Candidate | None = None
     left = whiteness(state.fit.residual, inputs)
     while len(state.accepted) < MOST_FINDINGS:
         if state.accepted:
@@ -109,6 +111,9 @@ def diagnose(
         first = first or candidates
         if not candidates or candidates[0].gain < threshold:
             break
+        if candidates[0].cause not in effects:
+            refused = candidates[0]
+            break
         accepting.called("fitting what was found")
         further = _with(state, candidates[0], rig)
         finely = _finely(further)
@@ -120,12 +125,12 @@ def diagnose(
         if state.accepted and not covered and patches(left, after):
             break
         state, left = further, after
-        if (left.passed or covered) and not any(c.gain > threshold for c in _still_wrong(state, effects)):
+        if (left.passed or covered) and not any(c.gain > threshold for c in _still_wrong(state)):
             break
     state = _finely(_without_idle(state))
     left = whiteness(state.fit.residual, inputs)
     told = concluding.called("simulating what was found")
-    return conclude(state, recording, nominal, rig, first, left, known, told)
+    return conclude(state, recording, nominal, rig, first, left, known, refused, told)
 
 
 def _connected(rig: Rig, recording: Recording) -> Rig:
@@ -223,9 +228,9 @@ def _finely(state: State) -> State:
     return replace(state, fit=refit, calibration=replace(state.calibration, misfit=misfit))
 
 
-def _still_wrong(state: State, effects: Mapping[str, type[Effect]]) -> list[Candidate]:
+def _still_wrong(state: State) -> list[Candidate]:
     """Parameters of the model that are out of tolerance with the causes so far in it."""
-    return wrong_parameters(state.misfit, state.fit, minus_two_log_evidence(state.fit), effects)
+    return wrong_parameters(state.misfit, state.fit, minus_two_log_evidence(state.fit), OWN_CHANGES)
 
 
 def _without_idle(state: State) -> State:

@@ -12,7 +12,7 @@ from identification.recording import Array
 from lab.diagnosis.calibrate import Calibration
 from lab.diagnosis.candidate import Candidate, last_of
 from lab.diagnosis.chance import quantile
-from lab.diagnosis.changes import large_changes, stiff_springs
+from lab.diagnosis.changes import OWN_CHANGES, large_changes, stiff_springs
 from lab.diagnosis.evidence import minus_two_log_evidence
 from lab.diagnosis.fit import Fit, fit
 from lab.diagnosis.misfit import Hypothesis, Misfit
@@ -39,7 +39,11 @@ def search(
     effects: Mapping[str, type[Effect]],
     work: Work = UNHEARD,
 ) -> tuple[list[Candidate], float]:
-    """Candidates for one more cause beside those present, best first, and the 2 log evidence that chance alone may reach."""
+    """Candidates for one more cause beside those present, best first, and the 2 log evidence that chance alone may reach.
+
+    Changes of what the model has already are among them even where `effects` leaves them out: calibration makes them anyhow,
+    and what is out of tolerance is not explained by not being named.
+    """
     misfit = calibration.misfit
     causes = present.causes
     screening, refitting, polishing, confirming, changing, stiffening = work.parts(*COSTS)
@@ -65,10 +69,11 @@ def search(
             picked.append(h)
             places.add(key)
     without = minus_two_log_evidence(present)
+    own_and_named = {**OWN_CHANGES, **effects}
     refits = _refitted(calibration, theta, present, picked, refitting)
     scored = sorted((last_of(f, g, without) for f, g in refits), key=lambda c: -c.gain)
     best = [_polished(misfit, c, without) for c in polishing.each(scored[:POLISHED])] + scored[POLISHED:]
-    own = sorted(wrong_parameters(misfit, present, without, effects), key=lambda c: -c.gain)
+    own = sorted(wrong_parameters(misfit, present, without, own_and_named), key=lambda c: -c.gain)
     candidates = [confirmed(misfit, c, without) for c in confirming.each(own[:POLISHED])]
     # What was not confirmed may not rank before what was.
     weakest = min((c.gain for c in candidates), default=0.0)
@@ -76,8 +81,8 @@ def search(
     candidates += _steadied(calibration, best, without)
     candidates += [
         Candidate(cause, place, found, without - minus_two_log_evidence(found), direction)
-        for cause, place, direction, found in large_changes(misfit, present, effects, changing)
-        if not mends(effects[cause], place, [(each.kind, each.location) for each in causes], survey)
+        for cause, place, direction, found in large_changes(misfit, present, own_and_named, changing)
+        if not mends(own_and_named[cause], place, [(each.kind, each.location) for each in causes], survey)
     ]
     candidates += [
         last_of(found, None, without) for found in stiff_springs(misfit, present, proposed, stiffening)

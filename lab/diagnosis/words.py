@@ -68,6 +68,15 @@ def inseparable(alternatives: Sequence[Alternative]) -> list[str]:
     ]
 
 
+def not_to_be_named(cause: str, location: str) -> str:
+    """What the data ask for, where it is not among the causes that may be named."""
+    where = "everywhere" if location == EVERYWHERE else f"at {location}"
+    return (
+        f"the data ask for a {cause.replace('_', ' ')} {where} that is out of the model's tolerance, and {cause} is not among "
+        "the causes that may be named; let it be named, or widen the tolerance"
+    )
+
+
 def as_in_the_baseline(power: Array, recording: Recording) -> str:
     """What is left, where that is no more than the baseline leaves."""
     shares = ", ".join(

@@ -69,6 +69,14 @@ def test_a_withheld_cause_is_not_misnamed_as_explained(rig):
     assert diagnose(recording, rig, effects=others).verdict == "unexplained"
 
 
+def test_a_change_that_may_not_be_named_is_not_calibrated_away(rig):
+    recording = measured(EFFECTS["stiffness_change"]("spring1_2", relative_change=0.3).apply(rig), seed=4)
+    diagnosis = diagnose(recording, rig, effects={"line_hum": EFFECTS["line_hum"]})
+    assert diagnosis.verdict == "unexplained"
+    assert diagnosis.findings == ()
+    assert "stiffness change at spring1_2 that is out of the model's tolerance" in diagnosis.warnings[-1]
+
+
 def test_data_without_forces_are_refused(rig):
     decay = simulate(rig, FreeDecay({"x1": 0.1}), sample_rate=5.0, duration=20.0)
     pushed = replace(decay, records=(replace(decay.records[0], kind="random"),))
