@@ -34,6 +34,9 @@ LONGEST = 1 << 14
 CHANCE = 1e-3
 """Probability that noise alone calls for a denominator."""
 
+REFINEMENTS = 2
+"""Times that the denominators are fitted anew with instruments; further times change less than the noise does."""
+
 BATCH = 1 << 18
 """Complex numbers held at a time."""
 
@@ -42,8 +45,9 @@ def local_response(recording: Recording) -> FrequencyResponse:
     """Frequency response functions of random records by local modelling, with their variance.
 
     Noise is taken to be on the outputs, as for H1. A denominator is used at the lines and outputs where it explains
-    more than noise would. With noise, the peak of a resonance that is one to three lines wide comes out lower by some
-    percent, as the model of a window is smoother than it is, and the damping as much higher; a longer record has more lines.
+    more than noise would. Least squares would make the peak of a resonance that is one to three lines wide too low by
+    some percent, and the damping as much too high, since noise is in the outputs that the denominator multiplies;
+    instrumental variables do not.
 
     Args:
         recording: records with inputs and without missing samples; cut into pieces of one length.
@@ -56,7 +60,8 @@ def local_response(recording: Recording) -> FrequencyResponse:
         RecordingError: a sample is missing, or inputs nowhere act independently.
 
     Source: Pintelon and Schoukens (2012), System Identification, 2nd ed., section 7.2.2 (local polynomial method);
-        McKelvey and Guérin (2012), Proc. 16th IFAC SYSID, eq. (5), for the denominator.
+        McKelvey and Guérin (2012), Proc. 16th IFAC SYSID, eq. (5), for the denominator; Söderström and Stoica (1989),
+        System Identification, ch. 8, for the instruments, which are the responses of the model fitted before.
     """
     recording.require_complete()
     length, starts = _pieces(recording)
@@ -176,13 +181,20 @@ def _local(u: Complex, y: Complex, powers: Array, smooth: Complex, size: Array) 
     Z = without_transient(times_powers(y, 1))  # (n_k, n_outputs, DEGREE, n_equations)
     d = Z @ Qc[:, None]
     Z = Z - d @ Qt[:, None]
-    a, Rz = _least_squares(Z, -left)
+    a, Rz = _along(_orthonormal(Z), Z, -left)
     rational = left + (a[:, :, None] @ Z)[:, :, 0]
     n_free = n_pieces * (width - DEGREE - 1) - n_inputs * (DEGREE + 1)
     power, power_rational = (np.sum(np.abs(e) ** 2, axis=2) for e in (left, rational))
     use = power_rational * scipy.special.fdtri(2 * DEGREE, 2 * (n_free - DEGREE), 1 - CHANCE) * DEGREE < (
         power - power_rational
     ) * (n_free - DEGREE)
+    # Noise in r y, r² y, … makes resonances too low; what the model makes of y is free of it.
+    for _ in range(REFINEMENTS):
+        e = (left + (a[:, :, None] @ Z)[:, :, 0]).reshape(y.shape)
+        denominator = 1 + a @ powers[:, :, 1:].transpose(0, 2, 1)  # (n_k, n_outputs, width)
+        instruments = without_transient(times_powers(y - e / denominator[:, :, None], 1))
+        instruments = instruments - (instruments @ Qc[:, None]) @ Qt[:, None]
+        a, Rz = _along(_orthonormal(instruments), Z, -left)
     b = b + (np.where(use[:, :, None], a, 0)[:, :, None] @ d)[:, :, 0]
     noise = np.where(use, power_rational / (n_free - DEGREE), power / n_free)
     inverse = np.linalg.inv(R)[:, :: DEGREE + 1]  # rows of b_j0, (n_k, n_inputs, n_columns)
@@ -194,15 +206,23 @@ def _local(u: Complex, y: Complex, powers: Array, smooth: Complex, size: Array) 
     return _Lines(H, variance, np.sum(spread, axis=1), alive)
 
 
-def _least_squares(Z: Complex, target: Complex) -> tuple[Complex, Complex]:
-    """Coefficients a with Σ_s a_s Z_s nearest to the target, and R of Z; zero where Z does not tell.
+def _orthonormal(Z: Complex) -> Complex:
+    """Q of each Z, transposed, shape (n_k, n_outputs, n_equations, DEGREE)."""
+    return np.asarray(np.linalg.qr(Z.transpose(0, 1, 3, 2))[0])
+
+
+def _along(Q: Complex, Z: Complex, target: Complex) -> tuple[Complex, Complex]:
+    """Coefficients a for which Σ_s a_s Z_s and the target are alike along Q, and Qᴴ Zᵀ; zero where Z does not tell.
+
+    With Q of Z itself this is least squares, with Q of other regressors an instrumental-variable estimate.
 
     Returns:
         Shapes (n_k, n_outputs, DEGREE) and (n_k, n_outputs, DEGREE, DEGREE).
     """
-    Q, R = np.linalg.qr(Z.transpose(0, 1, 3, 2))
+    Qh = Q.conj().transpose(0, 1, 3, 2)
+    R = Qh @ Z.transpose(0, 1, 3, 2)
     size = np.abs(np.diagonal(R, axis1=2, axis2=3))
     poor = np.min(size, axis=2) <= 1e-10 * np.max(size, axis=2)
     R = np.where(poor[:, :, None, None], np.eye(DEGREE), R)
-    a = np.linalg.solve(R, Q.conj().transpose(0, 1, 3, 2) @ target[..., None])[..., 0]
+    a = np.linalg.solve(R, Qh @ target[..., None])[..., 0]
     return np.asarray(np.where(poor[:, :, None], 0, a)), R

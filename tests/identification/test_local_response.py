@@ -7,11 +7,11 @@ import pytest
 
 from identification.errors import RecordingError, TooShortError
 from identification.frequency_domain import plscf_recording
-from identification.local_response import DEGREE, _width, local_response
+from identification.local_response import DEGREE, REFINEMENTS, _width, local_response
 from identification.recording import Record
 from identification.spectra import frequency_response
 from identification.systems import SecondOrder
-from tests.systems import actuators, chain7, instrumented, noisy, recorded, sensors
+from tests.systems import actuators, chain7, instrumented, noisy, paper_chain3, recorded, sensors
 
 
 def light_chain(ratio=0.003):
@@ -47,7 +47,7 @@ def test_nothing_leaks_where_a_window_widens_every_resonance():
 
 
 @pytest.mark.parametrize("sizes", [[800], [400, 700]], ids=["one record", "records of two lengths"])
-def test_it_equals_one_least_squares_problem_per_line_and_output(sizes):
+def test_it_equals_one_problem_per_line_and_output(sizes):
     recording = shaken(light_chain(), sizes, level=0.3)
     response = local_response(recording)
     pieces = [
@@ -68,12 +68,15 @@ def test_it_equals_one_least_squares_problem_per_line_and_output(sizes):
                 rhs.append(X[2 + o, lines])
             polynomial, y = np.vstack(rows), np.concatenate(rhs)
             rational = np.hstack([polynomial, np.vstack(denominators)])
-            candidates = [
-                np.linalg.lstsq(A, y, rcond=None)[0][[0, DEGREE + 1]] for A in (polynomial, rational)
-            ]
-            gap = min(np.max(np.abs(response.values[k, o] - H)) for H in candidates)
-            # Powers up to the fourth over a window: a condition number of some thousands.
-            assert gap < 1e-10 * np.max(np.abs(response.values[:, o]))
+            plain, theta = (np.linalg.lstsq(A, y, rcond=None)[0] for A in (polynomial, rational))
+            for _ in range(REFINEMENTS):
+                denominator = 1 + np.tile(powers[:, 1:], (len(pieces), 1)) @ theta[-DEGREE:]
+                clean = y - (y - rational @ theta) / denominator  # what the model makes of the output
+                instruments = np.hstack([polynomial, np.vstack(denominators) * (clean / y)[:, None]])
+                theta = np.linalg.solve(instruments.conj().T @ rational, instruments.conj().T @ y)
+            gap = min(np.max(np.abs(response.values[k, o] - H[[0, DEGREE + 1]])) for H in (plain, theta))
+            # Powers up to the fourth over a window: a condition number of some thousands, squared by the instruments.
+            assert gap < 1e-8 * np.max(np.abs(response.values[:, o]))
 
 
 def test_the_variance_is_that_of_repeated_tests():
@@ -84,6 +87,20 @@ def test_the_variance_is_that_of_repeated_tests():
     claimed = np.mean([each.variance for each in found], axis=0)
     # To first order; that the better of two models is taken hides up to a quarter of the noise.
     assert 0.9 < np.median(spread / claimed) < 1.3
+
+
+def test_the_peak_of_a_resonance_as_narrow_as_a_line_is_not_too_low():
+    system = paper_chain3()
+    share = []
+    for seed in range(40):
+        response = local_response(shaken(system, [1200], seed=seed, level=0.05))
+        lines = [int(np.argmin(np.abs(response.frequency_hz - f))) for f in system.modes().frequency_hz[:2]]
+        truth = system.frequency_response(response.frequency_hz[lines])
+        along = np.real((response.values[lines] - truth) * truth.conj()) / np.abs(truth) ** 2
+        share.append(np.mean(along, axis=(1, 2)))
+    # Least squares alone makes the two peaks 4 % and 3 % too low. The mean of these tests is known to half a percent.
+    assert np.all(np.std(share, axis=0) / np.sqrt(len(share)) < 0.006)
+    assert np.all(np.abs(np.mean(share, axis=0)) < 0.02)
 
 
 def test_light_damping_comes_out_of_polyreference_least_squares():
