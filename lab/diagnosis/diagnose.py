@@ -97,6 +97,7 @@ def diagnose(
     inputs = misfit.driven
     first: list[Candidate] = []
     refused: Candidate | None = None
+    fine: State | None = None
     left = whiteness(state.fit.residual, inputs)
     while len(state.accepted) < MOST_FINDINGS:
         if state.accepted:
@@ -106,7 +107,7 @@ def diagnose(
         if candidates:
             better = settled(state.misfit, state.fit, candidates[0].fit)
             if better.objective < state.fit.objective - UNSETTLED:
-                state = _settled(state, better, rig)
+                state, fine = _settled(state, better, rig), None
                 candidates, threshold = search(state.calibration, state.fit, effects)
         first = first or candidates
         if not candidates or candidates[0].gain < threshold:
@@ -121,13 +122,15 @@ def diagnose(
         after = whiteness(finely.fit.residual, inputs)
         if not after.white:
             further = _renamed(_restarted(further), effects)
-            after = whiteness(_finely(further).fit.residual, inputs)
+            finely = _finely(further)
+            after = whiteness(finely.fit.residual, inputs)
         if state.accepted and not covered and patches(left, after):
             break
-        state, left = further, after
+        state, left, fine = further, after, finely
         if (left.passed or covered) and not any(c.gain > threshold for c in _still_wrong(state)):
             break
-    state = _finely(_without_idle(state))
+    kept = _without_idle(state)
+    state = fine if fine is not None and kept is state else _finely(kept)
     left = whiteness(state.fit.residual, inputs)
     told = concluding.called("simulating what was found")
     return conclude(state, recording, nominal, rig, first, left, known, refused, told)
