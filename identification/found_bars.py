@@ -9,9 +9,9 @@ import numpy as np
 from identification.errors import IdentificationError
 from identification.found import Found
 from identification.modes import Modes
-from identification.observer_redraw import observer_scatter
+from identification.observer_scatter import observer_scatter
 from identification.progress import UNHEARD, Work
-from identification.spectral_scatter import SPECTRAL, Bars, spectral_std
+from identification.spectral_scatter import SPECTRAL, ModeErrorBars, spectral_scatter
 from identification.systems import SecondOrder
 from identification.uncertainty import matrices_with_error_bars, modes_with_error_bars
 
@@ -67,15 +67,15 @@ def _of_modes(found: Found, work: Work) -> tuple[Modes, tuple[str, ...]]:
         ), ()
     if not len(found.modes):
         return found.modes, ()
-    bars = spectral_std(found.recording, found.realization, found.tracks(), settings=given, work=work)
+    bars = spectral_scatter(found.recording, found.realization, found.tracks(), settings=given, work=work)
     return _with(found.modes, bars), told_shift(found.modes, bars)
 
 
-def _with(modes: Modes, bars: Bars) -> Modes:
+def _with(modes: Modes, bars: ModeErrorBars) -> Modes:
     return replace(modes, frequency_std=bars.frequency, damping_std=bars.damping)
 
 
-def told_shift(modes: Modes, bars: Bars) -> tuple[str, ...]:
+def told_shift(modes: Modes, bars: ModeErrorBars) -> tuple[str, ...]:
     """One sentence where noise shifts a damping ratio by more than a share `TOLD` of its error bar, or none.
 
     Args:

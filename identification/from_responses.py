@@ -10,7 +10,7 @@ from identification.explanation import explanation
 from identification.frequency_domain import resonance_band
 from identification.identify import Identification
 from identification.layout import layout
-from identification.line_redraw import line_scatter
+from identification.line_scatter import line_scatter
 from identification.modes import Modes
 from identification.plscf import plscf, response_rank
 from identification.response import FrequencyResponse

@@ -31,7 +31,7 @@ MAY_FAIL = 0.1
 """Share of the tests drawn that may fail to give an estimate."""
 
 
-class Redrawn(NamedTuple):
+class ErrorBars(NamedTuple):
     """What redrawn noise does to an estimate.
 
     Attributes:
@@ -53,7 +53,7 @@ def residual_scatter(
     truth: Array | None = None,
     rng: np.random.Generator | None = None,
     work: Work = UNHEARD,
-) -> Redrawn:
+) -> ErrorBars:
     """One standard deviation of an estimate and its mean error, from tests with the noise of the outputs drawn anew.
 
     Where the truth of these tests is told, deviations count from it: what noise makes too large on average is part of
@@ -97,7 +97,7 @@ def residual_scatter(
     return scatter_of(np.array(draws), truth)
 
 
-def scatter_of(values: Array, truth: Array | None = None) -> Redrawn:
+def scatter_of(values: Array, truth: Array | None = None) -> ErrorBars:
     """One standard deviation of estimates from tests that were drawn, about their truth or else their mean, and their shift.
 
     Args:
@@ -116,7 +116,7 @@ def scatter_of(values: Array, truth: Array | None = None) -> Redrawn:
     known = np.isfinite(truth)
     variance = np.sum((values - np.where(known, truth, mean)) ** 2, axis=0, where=have) / (n - 1 + known)
     enough = np.mean(have, axis=0) >= 1 - MAY_FAIL
-    return Redrawn(np.where(enough, np.sqrt(variance), np.inf), np.where(enough, mean - truth, np.nan))
+    return ErrorBars(np.where(enough, np.sqrt(variance), np.inf), np.where(enough, mean - truth, np.nan))
 
 
 def redrawn(e: Array, rng: np.random.Generator) -> Array:

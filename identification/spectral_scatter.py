@@ -44,7 +44,7 @@ LOST = 0.2
 """Relative distance beyond which the nearest pole is another one."""
 
 
-class Bars(NamedTuple):
+class ModeErrorBars(NamedTuple):
     """Error bars of modes.
 
     Attributes:
@@ -119,14 +119,14 @@ class Tracks:
         return Modes(mean.frequency_hz, mean.damping_ratio, mean.shapes, realization.systems[0].outputs)
 
 
-def spectral_std(
+def spectral_scatter(
     recording: Recording,
     realization: Realization,
     tracks: Tracks,
     *,
     settings: Mapping[str, Any] | None = None,
     work: Work = UNHEARD,
-) -> Bars:
+) -> ModeErrorBars:
     """Standard deviations of frequencies and damping ratios, and the shift of the latter.
 
     Args:
@@ -147,7 +147,7 @@ def spectral_std(
     """
     if realization.method == "efdd":
         std = _leaving_pieces_out(recording, realization, tracks)
-        return Bars(std[0], std[1], np.full(std.shape[1], np.nan))
+        return ModeErrorBars(std[0], std[1], np.full(std.shape[1], np.nan))
     again = repeat(recording, realization, np.unique(tracks.orders).tolist(), settings or {})
     n = len(np.unique(tracks.mode))
 
@@ -174,7 +174,7 @@ def spectral_std(
     else:
         std = jackknife_std(recording, estimate, work=work)
         shift = np.full(2 * n, np.nan)
-    return Bars(std[:n], std[n:], shift[n:])
+    return ModeErrorBars(std[:n], std[n:], shift[n:])
 
 
 def values_near(poles: Complex, modes: Modes) -> Array:

@@ -1,10 +1,10 @@
 """Error bars: how far modes and matrices may be from the truth, one standard deviation, for every method.
 
 - `era`: the residual's noise, to first order through the Hankel matrix (`pulse_scatter`).
-- `okid_era`: the noise redrawn, and the whole way gone again (`observer_redraw`).
+- `okid_era`: the noise redrawn, and the whole way gone again (`observer_scatter`).
 - `ssi_cov`, `ssi_data`, `next_era`: the record's own randomness, as the mean of a series in time (`covariance_scatter`).
 - `plscf` and `efdd`: the noise redrawn, or pieces left out (`spectral_scatter`).
-- `era_dc`, `itd`, `mrtd`, `mmrtd`: the noise redrawn, and the way to the modes gone again (`markov_redraw`).
+- `era_dc`, `itd`, `mrtd`, `mmrtd`: the noise redrawn, and the way to the modes gone again (`markov_scatter`).
 
 Over repeated tests the truth lies within ±2 of them about 95 % of the time, as long as the method itself has no
 bias to speak of; where noise is redrawn, what it shifts on average counts as part of them. Without noise they are
@@ -23,15 +23,15 @@ import numpy as np
 from identification.covariance_scatter import covariance_scatter
 from identification.error_bars import modes_with_std
 from identification.errors import IdentificationError
-from identification.markov_redraw import markov_scatter
+from identification.markov_scatter import markov_scatter
 from identification.matrix_scatter import matrices_with_std
 from identification.modes import Modes
-from identification.observer_redraw import matrix_model, observer_scatter
+from identification.observer_scatter import matrix_model, observer_scatter
 from identification.parameterizations import Tangent
 from identification.pulse_scatter import pulse_tangent
 from identification.recording import Array, Recording
 from identification.settled import NESTED
-from identification.spectral_scatter import SPECTRAL, Tracks, spectral_std
+from identification.spectral_scatter import SPECTRAL, Tracks, spectral_scatter
 from identification.systems import Realization, SecondOrder
 
 
@@ -66,7 +66,7 @@ def modes_with_error_bars(
         TooShortError: too few data to tell.
         IdentificationError: the records or the model allow no error bars; says why.
 
-    Source: as for `pulse_tangent`, `observer_scatter`, `covariance_scatter`, `spectral_std` and
+    Source: as for `pulse_tangent`, `observer_scatter`, `covariance_scatter`, `spectral_scatter` and
         `markov_scatter`.
     """
     if places is None:
@@ -83,7 +83,7 @@ def modes_with_error_bars(
             :2
         ]
     elif realization.method in SPECTRAL:
-        std = spectral_std(recording, realization, Tracks.of_places(places), settings=given)[:2]
+        std = spectral_scatter(recording, realization, Tracks.of_places(places), settings=given)[:2]
     else:
         std = markov_scatter(recording, realization, places)[:2]
     return replace(modes, frequency_std=std[0], damping_std=std[1])

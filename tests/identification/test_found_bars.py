@@ -7,7 +7,7 @@ from benchmarks.error_bars import pulses
 from identification.found_bars import told_shift
 from identification.identify import identify
 from identification.residual_scatter import scatter_of
-from identification.spectral_scatter import Bars
+from identification.spectral_scatter import ModeErrorBars
 from tests.systems import paper_chain3
 
 MODES = paper_chain3().modes()
@@ -33,11 +33,11 @@ def test_estimates_that_are_often_lost_have_neither():
 def test_only_a_shift_to_speak_of_is_told_and_of_the_mode_that_has_most():
     none = np.full(3, np.nan)
     size = np.full(3, 1e-3)
-    assert told_shift(MODES, Bars(size, size, none)) == ()
-    assert told_shift(MODES, Bars(size, size, 0.4 * size)) == ()
-    (said,) = told_shift(MODES, Bars(size, size, np.array([0.6, -0.9, np.nan]) * size))
+    assert told_shift(MODES, ModeErrorBars(size, size, none)) == ()
+    assert told_shift(MODES, ModeErrorBars(size, size, 0.4 * size)) == ()
+    (said,) = told_shift(MODES, ModeErrorBars(size, size, np.array([0.6, -0.9, np.nan]) * size))
     assert f"{MODES.frequency_hz[1]:.4g} Hz by about -0.0009" in said
-    assert told_shift(MODES.take([]), Bars(none[:0], none[:0], none[:0])) == ()
+    assert told_shift(MODES.take([]), ModeErrorBars(none[:0], none[:0], none[:0])) == ()
 
 
 def test_an_observer_of_short_pulses_tells_what_noise_shifts():

@@ -7,7 +7,7 @@ import pytest
 
 from identification.errors import IdentificationError
 from identification.from_responses import identify_responses
-from identification.line_redraw import noise_std
+from identification.line_scatter import noise_std
 from identification.response import FrequencyResponse
 from tests import systems
 

@@ -12,14 +12,14 @@ from identification.errors import TooShortError
 from identification.fdd import efdd
 from identification.frequency_domain import plscf_recording
 from identification.modes import Modes
-from identification.spectral_scatter import Tracks, spectral_std
+from identification.spectral_scatter import Tracks, spectral_scatter
 from tests.ambient import ambient, output_record
 from tests.systems import noisy, paper_chain3, recorded
 
 
 def bars(recording, realization, **settings):
     modes = realization.system.modes()
-    return modes, spectral_std(
+    return modes, spectral_scatter(
         recording, realization, Tracks.of_modes(modes, realization.order), settings=settings
     )[:2]
 
@@ -55,7 +55,7 @@ def test_a_mode_that_is_lost_without_some_pieces_has_no_finite_bar():
     realization = efdd(recording)
     modes = realization.system.modes().take([0])
     away = Modes(2.1 * modes.frequency_hz, modes.damping_ratio, modes.shapes, modes.outputs)
-    std = spectral_std(recording, realization, Tracks.of_modes(away, realization.order))[:2]
+    std = spectral_scatter(recording, realization, Tracks.of_modes(away, realization.order))[:2]
     assert np.all(np.isinf(std))
 
 
@@ -64,7 +64,7 @@ def test_three_pieces_do_not_tell_how_much_they_scatter():
     realization = efdd(recording, n_segment=1000)
     short = recording.cut(0, 2000 * recording.dt)
     with pytest.raises(TooShortError, match="3 pieces of 1000 samples"):
-        spectral_std(short, realization, Tracks.of_modes(realization.system.modes(), realization.order))
+        spectral_scatter(short, realization, Tracks.of_modes(realization.system.modes(), realization.order))
 
 
 @pytest.mark.slow

@@ -14,7 +14,7 @@ from identification.pulse import markov_parameters
 from identification.pulse_scatter import residual_std
 from identification.recording import Array, Recording
 from identification.residual_scatter import DRAWS, scatter_of
-from identification.spectral_scatter import Bars, values_near
+from identification.spectral_scatter import ModeErrorBars, values_near
 from identification.systems import MarkovParameters, Realization, StateSpace
 
 
@@ -44,7 +44,7 @@ def with_best_inputs(markov: MarkovParameters, system: StateSpace) -> StateSpace
 
 def markov_scatter(
     recording: Recording, realization: Realization, places: Sequence[tuple[int, complex]]
-) -> Bars:
+) -> ModeErrorBars:
     """Standard deviations of frequencies and damping ratios, with what noise shifts on average in them.
 
     The noise is taken as white, with a variance of its own in each response: that of the residual of the model.
@@ -90,4 +90,4 @@ def markov_scatter(
     draws = [estimate(clean + std * rng.standard_normal(clean.shape)) for _ in range(DRAWS)]
     spread, shift = scatter_of(np.array(draws), values_near(poles, system.modes()))
     n = poles.size
-    return Bars(spread[:n], spread[n:], shift[n:])
+    return ModeErrorBars(spread[:n], spread[n:], shift[n:])

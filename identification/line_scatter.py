@@ -12,7 +12,7 @@ from identification.plscf import plscf
 from identification.recording import Array
 from identification.residual_scatter import DRAWS, scatter_of
 from identification.response import FrequencyResponse
-from identification.spectral_scatter import Bars, Tracks, values_near
+from identification.spectral_scatter import ModeErrorBars, Tracks, values_near
 from identification.systems import Realization
 
 Complex = NDArray[np.complex128]
@@ -27,7 +27,7 @@ def line_scatter(
     tracks: Tracks,
     *,
     band: tuple[float, float] | None = None,
-) -> Bars:
+) -> ModeErrorBars:
     """Standard deviations of frequencies and damping ratios, with what noise shifts on average in the latter.
 
     Each line of the model gets complex noise of the variance that the responses state, or else of the power that the
@@ -80,7 +80,7 @@ def line_scatter(
         raise IdentificationError(
             "the modes do not come back when the analysis is repeated; take another order"
         )
-    return Bars(std[:n], std[n:], shift[n:])
+    return ModeErrorBars(std[:n], std[n:], shift[n:])
 
 
 def noise_std(response: FrequencyResponse, clean: Complex, n_states: int) -> Array:

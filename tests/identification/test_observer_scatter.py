@@ -7,7 +7,7 @@ import pytest
 
 from identification.errors import IdentificationError
 from identification.identify import identify
-from identification.observer_redraw import matrix_model, observer_scatter
+from identification.observer_scatter import matrix_model, observer_scatter
 from identification.okid import okid_era
 from tests.systems import chain3, paper_chain3, pulse_recording, recorded, with_noise
 

@@ -11,7 +11,7 @@ from benchmarks.error_bars import Case, calibrate
 from identification.era import era_dc
 from identification.identify import identify
 from identification.markov_methods import MARKOV_METHODS
-from identification.markov_redraw import markov_scatter, with_best_inputs
+from identification.markov_scatter import markov_scatter, with_best_inputs
 from identification.methods import METHODS
 from identification.pulse import markov_parameters
 from identification.pulse_scatter import residual_std

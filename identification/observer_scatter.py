@@ -22,13 +22,13 @@ from identification.progress import UNHEARD, Work
 from identification.recording import Array, Recording
 from identification.residual_scatter import residual_scatter
 from identification.second_order import second_order
-from identification.spectral_scatter import Bars, values_near
+from identification.spectral_scatter import ModeErrorBars, values_near
 from identification.systems import Realization, SecondOrder, StateSpace
 
 MATRICES = ("mass", "damping", "stiffness")
 
 
-class Scatter(NamedTuple):
+class ModelErrorBars(NamedTuple):
     """Error bars of modes and matrices.
 
     Attributes:
@@ -36,7 +36,7 @@ class Scatter(NamedTuple):
         matrices: with their standard deviations; None where none were given.
     """
 
-    modes: Bars
+    modes: ModeErrorBars
     matrices: SecondOrder | None
 
 
@@ -48,7 +48,7 @@ def observer_scatter(
     orders: Sequence[int] | None = None,
     matrices: SecondOrder | None = None,
     work: Work = UNHEARD,
-) -> Scatter:
+) -> ModelErrorBars:
     """Standard deviations of modes, and of M, C_d and K, with what noise shifts on average in them.
 
     Args:
@@ -71,8 +71,8 @@ def observer_scatter(
     n = len(modes)
     length = int(realization.settings["observer"])
     if observe(recording, observer=length).exact:
-        none = Bars(np.zeros(n), np.zeros(n), np.zeros(n))
-        return Scatter(none, None if matrices is None else _with_std(matrices, 0.0))
+        none = ModeErrorBars(np.zeros(n), np.zeros(n), np.zeros(n))
+        return ModelErrorBars(none, None if matrices is None else _with_std(matrices, 0.0))
     model = forced_model(recording, modes, likeliest=True)
     own = [realization.order] * n if orders is None else list(orders)
 
@@ -94,7 +94,7 @@ def observer_scatter(
         recording, model.residuals, estimate, n_unknowns=model.n_unknowns, truth=truth, work=work
     )
     found = None if matrices is None else _with_std(matrices, std[2 * n :])
-    return Scatter(Bars(std[:n], std[n : 2 * n], shift[n : 2 * n]), found)
+    return ModelErrorBars(ModeErrorBars(std[:n], std[n : 2 * n], shift[n : 2 * n]), found)
 
 
 def matrix_model(realization: Realization, n_dofs: int) -> StateSpace:
