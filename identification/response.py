@@ -13,6 +13,9 @@ from identification.recording import Array, Channel, frozen, named_rows
 
 Complex = NDArray[np.complex128]
 
+SCALES = ("known", "unknown per input", "unknown per response")
+"""What a test bench may leave open: nothing, one complex factor on all responses to an input, or one on every response."""
+
 
 @dataclass(frozen=True, eq=False, repr=False)
 class FrequencyResponse:
@@ -31,6 +34,7 @@ class FrequencyResponse:
             one power at all lines, 1 on average; None for equal weights.
         n_averages: number of independent pieces of record behind each value.
         decay: rate of the exponential window on the signals [1/s], by which poles appear shifted.
+        scale: which complex factors on the values nobody knows, one of `SCALES`.
         notes: what was chosen and why, one sentence each.
     """
 
@@ -44,6 +48,7 @@ class FrequencyResponse:
     weight: Array | None = None
     n_averages: float = 1.0
     decay: float = 0.0
+    scale: str = "known"
     notes: tuple[str, ...] = ()
 
     def __post_init__(self) -> None:
@@ -53,6 +58,8 @@ class FrequencyResponse:
         values = np.array(self.values, dtype=np.complex128)
         values.setflags(write=False)
         object.__setattr__(self, "values", values)
+        if self.scale not in SCALES:
+            raise IdentificationError(f"the scale is {self.scale!r}; expected one of {', '.join(SCALES)}")
         expected = (self.frequency_hz.size, len(self.outputs), len(self.inputs))
         if values.shape != expected:
             raise IdentificationError(f"frequency responses have shape {values.shape}; expected {expected}")

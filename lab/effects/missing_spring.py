@@ -71,9 +71,12 @@ class MissingSpring(Effect):
 
     @classmethod
     def places(cls, rig: Rig) -> tuple[str, ...]:
-        """Every pair of bodies, and every body and the ground, not tied by a spring yet."""
+        """Every pair of bodies, and every body and the ground, not tied by a spring yet and moving against each other."""
+        tied, motion = _tied(rig), _motion(rig)
         return tuple(
-            pair for pair in pairs((WORLD, *rig.bodies)) if pair not in _tied(rig) and _possible(rig, pair)
+            pair
+            for pair in pairs((WORLD, *rig.bodies))
+            if pair not in tied and _possible(rig, pair) and _extends(rig, pair, motion)
         )
 
 
@@ -148,6 +151,31 @@ def _spatial(rig: Rig, a: str, b: str) -> tuple[Rig, ET.Element]:
 def _possible(rig: Rig, pair: str) -> bool:
     a, _, b = pair.partition("|")
     return WORLD not in (a, b) or _lone_slide(rig, b) is not None
+
+
+def _motion(rig: Rig) -> dict[str, tuple[np.ndarray, np.ndarray]]:
+    """Place of the origin of every body that can move, and its motion per displacement, (3,) and (3, n_dofs)."""
+    m, data = rig.model, mujoco.MjData(rig.model)
+    data.qpos[:] = rig.operating_point
+    mujoco.mj_kinematics(m, data)
+    mujoco.mj_comPos(m, data)
+    found = {}
+    for body in rig.bodies:
+        index, J = body_number(rig, body), np.zeros((3, m.nv))
+        mujoco.mj_jac(m, data, J, None, data.xpos[index], index)
+        found[body] = (data.xpos[index].copy(), J)
+    return found
+
+
+def _extends(rig: Rig, pair: str, motion: dict[str, tuple[np.ndarray, np.ndarray]]) -> bool:
+    """Whether a spring between two bodies extends with small displacements: one along a straight beam does not."""
+    a, _, b = pair.partition("|")
+    if WORLD in (a, b) or _straight(rig, a, b) is not None:
+        return True
+    (here, J), (there, other) = motion[a], motion[b]
+    along = there - here
+    rate = along @ (other - J)
+    return bool(np.any(np.abs(rate) > 1e-9 * np.linalg.norm(along) * (np.abs(J) + np.abs(other)).max()))
 
 
 def _tied(rig: Rig) -> set[str]:

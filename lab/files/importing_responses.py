@@ -43,7 +43,8 @@ def responses_of(sources: Sequence[Source], recipe: Recipe) -> FrequencyResponse
         row, column = _position(part.output, outputs, "outputs"), _position(part.input, inputs, "inputs")
         if not np.isnan(values[:, row, column]).all():
             raise FileError(f"the response of {part.output!r} to {part.input!r} is given twice")
-        values[:, row, column] = _values(source, part) * to_output[row] / to_input[column]
+        derived = (2j * np.pi * frequency) ** part.derivatives
+        values[:, row, column] = _values(source, part) / derived * to_output[row] / to_input[column]
     lacking = np.argwhere(np.isnan(values).all(axis=0))
     if lacking.size:
         row, column = lacking[0]
@@ -51,7 +52,8 @@ def responses_of(sources: Sequence[Source], recipe: Recipe) -> FrequencyResponse
             f"the response of {outputs[row].name!r} to {inputs[column].name!r} is missing in [[responses]]"
         )
     try:
-        return FrequencyResponse(frequency, values, 0.0, inputs, outputs)
+        response = FrequencyResponse(frequency, values, 0.0, inputs, outputs, scale=recipe.frequency.scale)
+        return response.between(recipe.frequency.lowest, recipe.frequency.highest or np.inf)
     except IdentificationError as error:
         raise FileError(str(error)) from None
 

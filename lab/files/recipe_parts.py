@@ -4,9 +4,18 @@ from __future__ import annotations
 
 from typing import Annotated, Literal, get_args
 
-from pydantic import BaseModel, ConfigDict, Field, NonNegativeInt, model_validator
+from pydantic import (
+    BaseModel,
+    ConfigDict,
+    Field,
+    NonNegativeFloat,
+    NonNegativeInt,
+    PositiveFloat,
+    model_validator,
+)
 
 from identification.recording import KINDS
+from identification.response import SCALES
 
 Column = str | Annotated[int, Field(ge=1)]
 """A column by its name, or by its number from 1."""
@@ -117,10 +126,20 @@ class RecordPart(Part):
 
 
 class FrequencyPart(Part):
-    """Where the frequencies of frequency responses are, and their unit."""
+    """Where the frequencies of frequency responses are, their unit, and what is known of the responses.
+
+    Attributes:
+        column: of the frequencies.
+        unit: likewise.
+        lowest, highest: lines kept [Hz]; all when left out.
+        scale: which complex factors on the responses nobody knows.
+    """
 
     column: Column
     unit: Literal["Hz", "kHz", "rad/s"]
+    lowest: NonNegativeFloat = 0.0
+    highest: PositiveFloat | None = None
+    scale: Literal["known", "unknown per input", "unknown per response"] = "known"
 
 
 class ResponsePart(Part):
@@ -133,6 +152,7 @@ class ResponsePart(Part):
         real, imaginary, magnitude, phase: columns.
         magnitude_unit: "linear", or "dB" for 20 lg of the ratio.
         phase_unit: "deg" or "rad".
+        derivatives: how many time derivatives of the response the values are, beyond what the units say (-1 is an integral).
     """
 
     output: str
@@ -145,6 +165,7 @@ class ResponsePart(Part):
     phase: Column | None = None
     magnitude_unit: Literal["linear", "dB"] | None = None
     phase_unit: Literal["deg", "rad"] | None = None
+    derivatives: Annotated[int, Field(ge=-4, le=4)] = 0
 
     @model_validator(mode="after")
     def _one_form(self) -> ResponsePart:
@@ -156,6 +177,8 @@ class ResponsePart(Part):
             )
         return self
 
+
+assert get_args(FrequencyPart.model_fields["scale"].annotation) == SCALES
 
 _FORMS: tuple[set[str], ...] = (
     {"value"},

@@ -2,8 +2,9 @@
 
 In it lie the data sets frequency (n_f,) [Hz] and values (n_f, n_outputs, n_inputs), complex, in output unit per
 input unit, and coherence (n_f, n_outputs) where known; its attributes are input_names, input_units, output_names,
-output_units, dofs and factors of both, and sample_time [s], zero where the response is that to forces that vary
-continuously, as an analyser measures it.
+output_units, dofs and factors of both, sample_time [s], zero where the response is that to forces that vary
+continuously, as an analyser measures it, and scale where complex factors on the values are unknown
+(`identification.response.SCALES`).
 """
 
 from __future__ import annotations
@@ -119,6 +120,8 @@ def _write(group: Any, response: FrequencyResponse) -> None:
         group.create_dataset("coherence", data=response.coherence)
     group.attrs["sample_time"] = response.dt
     group.attrs["n_averages"] = response.n_averages
+    if response.scale != "known":
+        group.attrs["scale"] = response.scale
     for side, channels in (("input", response.inputs), ("output", response.outputs)):
         group.attrs[f"{side}_names"] = _strings([channel.name for channel in channels])
         group.attrs[f"{side}_units"] = _strings([channel.unit for channel in channels])
@@ -142,6 +145,7 @@ def _read(group: Any) -> FrequencyResponse:
         outputs,
         coherence=np.asarray(group["coherence"][()]) if "coherence" in group else None,
         n_averages=float(group.attrs.get("n_averages", 1.0)),
+        scale=str(group.attrs.get("scale", "known")),
     )
 
 

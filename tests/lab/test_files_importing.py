@@ -141,8 +141,21 @@ phase_unit = "deg"
     np.testing.assert_allclose(response.values[:, 0, 0], -H * 9.80665e-3, rtol=1e-13)
     np.testing.assert_array_equal(response.frequency_hz, f)
     assert (response.outputs[0].unit, response.inputs[0].unit, response.dt) == ("m/s^2", "N", 0.0)
+    assert response.scale == "known"
     with pytest.raises(FileError, match="frequency responses and no samples"):
         load(tmp_path / "out.h5")
+    # The same readings, taken for jerk per force of unknown scale, on some lines.
+    more = recipe.replace(
+        'unit = "Hz"', 'unit = "Hz"\nlowest = 0.6\nhighest = 1.9\nscale = "unknown per input"'
+    )
+    found = read_foreign(table(tmp_path, columns), parse_recipe(more + "derivatives = 1\n"))
+    save_imported(found, tmp_path / "jerk.h5")
+    jerk = load_responses(tmp_path / "jerk.h5")
+    assert jerk.scale == "unknown per input"
+    np.testing.assert_array_equal(jerk.frequency_hz, f[1:6])
+    np.testing.assert_allclose(
+        jerk.values[:, 0, 0], (response.values[:, 0, 0] / (2j * np.pi * f))[1:6], rtol=1e-13
+    )
 
 
 @pytest.mark.parametrize(

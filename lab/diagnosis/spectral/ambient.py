@@ -16,6 +16,7 @@ from identification.recording import Array
 from lab.diagnosis.misfit import Hypothesis, Parameters
 from lab.diagnosis.spectral.likelihood import explained
 from lab.diagnosis.spectral.lines import Averages, Complex
+from lab.diagnosis.spectral.neighbourhood import Neighbourhood, Stepwise
 from lab.diagnosis.spectral.transfer import at_time, drifts, plant_response
 from lab.effects.survey import Survey
 from lab.plant import Plant, Tone
@@ -81,6 +82,10 @@ class Ambient:
         diagonal = np.arange(self.scale.size)
         S[..., diagonal, diagonal] += np.exp(nuisance[self.n_forces :])
         return np.asarray(S)
+
+    def around(self, theta: Array, causes: Sequence[Hypothesis], nuisance: Array) -> Neighbourhood:
+        """Predictions of models near one."""
+        return Stepwise(self, theta, causes, nuisance)
 
     def nuisance_slopes(self, theta: Array, causes: Sequence[Hypothesis], nuisance: Array) -> Complex:
         """Derivative of S by the logarithm of every power, (n_forces + n_outputs, *shape of S)."""

@@ -12,8 +12,9 @@ from identification.recording import Array
 from lab.diagnosis.candidate import Candidate
 from lab.diagnosis.changes import DAMPING_FACTORS, FACTORS, WORTH, directions
 from lab.diagnosis.evidence import minus_two_log_evidence
-from lab.diagnosis.spectral.fit import SpectralFit, fit, point
+from lab.diagnosis.spectral.fit import SpectralFit, fit, objective
 from lab.diagnosis.spectral.likelihood import Likelihood
+from lab.diagnosis.spectral.neighbourhood import Trial
 from lab.diagnosis.tolerance import wrong_parameters
 from lab.effects.effect import Effect
 
@@ -44,37 +45,42 @@ def changes(
     # What was not confirmed may not rank before what was.
     weakest = min((c.gain for c in confirmed), default=0.0)
     rest = [replace(c, gain=min(c.gain, weakest)) for c in small[CONFIRMED:]]
-    proposed = list(directions(likelihood, effects))  # type: ignore[arg-type]
-    large = _large(likelihood, present, effects, starts, without)
+    proposed = list(_open(likelihood, effects))
+    large = _large(likelihood, effects, starts, without)
     return [*confirmed, *rest, *large], len(proposed)
 
 
 def _large(
     likelihood: Likelihood,
-    present: SpectralFit,
     effects: Mapping[str, type[Effect]],
     starts: Sequence[SpectralFit],
     without: float,
 ) -> Iterator[Candidate]:
-    """The likeliest large changes, fitted with their priors lifted."""
-    best: dict[tuple[str, str], tuple[float, Array, SpectralFit, Array]] = {}
+    """The likeliest large changes from every start, fitted with their priors lifted."""
     parameters = likelihood.parameters
+    for start in starts:
+        near = likelihood.around(start.theta, start.causes, start.nuisance)
+        best: dict[tuple[str, str], tuple[float, Trial, Any]] = {}
+        for cause, location, direction in _open(likelihood, effects):
+            if parameters.is_free(direction):
+                continue
+            lifted: Any = replace(likelihood, parameters=parameters.lifted(direction))  # type: ignore[type-var]
+            trials = near.along(direction, DAMPING_FACTORS if cause == "damping_change" else FACTORS)
+            levels = [(objective(lifted, *trial), trial, (lifted, direction)) for trial in trials]
+            best[cause, location] = min(levels, key=lambda level: level[0])
+        ranked = sorted(best.items(), key=lambda item: item[1][0])[:FOLLOWED]
+        for (cause, location), (reached, trial, (lifted, direction)) in ranked:
+            if reached < start.objective - WORTH:
+                found: Any = fit(lifted, trial.theta, start.causes, trial.nuisance)
+                yield Candidate(cause, location, found, without - _cost(found), direction)
+
+
+def _open(likelihood: Likelihood, effects: Mapping[str, type[Effect]]) -> Iterator[tuple[str, str, Array]]:
+    """Cause, location and direction of every change of a number that is not known: one with a width of zero is."""
+    widths = likelihood.parameters.widths
     for cause, location, direction in directions(likelihood, effects):  # type: ignore[arg-type]
-        if parameters.is_free(direction):
-            continue
-        lifted: Any = replace(likelihood, parameters=parameters.lifted(direction))  # type: ignore[type-var]
-        for start in starts:
-            for factor in DAMPING_FACTORS if cause == "damping_change" else FACTORS:
-                theta = start.theta + np.log(factor) * direction / parameters.widths
-                reached = point(lifted, theta, start.causes, start.nuisance).objective
-                if (cause, location) not in best or reached < best[cause, location][0]:
-                    best[cause, location] = (reached, theta, start, direction)
-    ranked = sorted(best.items(), key=lambda item: item[1][0])[:FOLLOWED]
-    for (cause, location), (reached, theta, start, direction) in ranked:
-        if reached < present.objective - WORTH:
-            changed = replace(likelihood, parameters=parameters.lifted(direction))  # type: ignore[type-var]
-            found: Any = fit(changed, theta, start.causes, start.nuisance)
-            yield Candidate(cause, location, found, without - _cost(found), direction)
+        if np.all(widths[direction != 0] > 0):
+            yield cause, location, direction
 
 
 def _confirmed(likelihood: Likelihood, present: SpectralFit, c: Candidate, without: float) -> Candidate:

@@ -45,6 +45,8 @@ from lab.twin import twin
 MOST_FINDINGS = 4
 FAR = 3.0
 """Standard deviations beyond which a calibrated parameter may hide a cause, so that the model as given is a better start."""
+NARROWEST = 1e-3
+"""Relative width of a prior below which no baseline takes it: masses do change a little by themselves."""
 RIGID = 1e12
 """Precision of a prior that lets a parameter not move."""
 
@@ -88,7 +90,7 @@ def diagnose_spectra(
         inputs=[channel.name for channel in data.inputs], outputs=[channel.name for channel in data.outputs]
     )
     model = twin(rig)
-    parameters = parameters_of(model, widths)
+    parameters, lesson = parameters_of(model, widths), None
     if parameters.inputs:
         raise LabError(
             f"a width is given for {parameters.names[-1]!r}, and the data are spectra; expected a recording with measured "
@@ -96,20 +98,22 @@ def diagnose_spectra(
         )
     if baseline is not None:
         work("calibrating on the baseline", 0.0)
-        known = _calibrated(_experiment(baseline, rig, band, share=1.0), rig, parameters)
+        known, lesson = _learned(_experiment(baseline, rig, band, share=1.0), rig, parameters)
         rig = calibrated_rig(known.likelihood, known.fit.theta, rig)
         parameters, model = _tightened(parameters, known.fit), twin(rig)
     work("calibrating", 0.05)
-    stage = origin = _calibrated(_experiment(data, rig, band), rig, parameters)
+    stage = origin = _calibrated(_experiment(data, rig, band).after(lesson), rig, parameters)
     visible = {name: kind for name, kind in effects.items() if name in stage.experiment.visible}
     given = _as_given(stage.likelihood, stage.fit)
+    # What changed since a baseline is better seen from there than from parameters that were moved to explain it.
+    start = given if baseline is not None or np.max(np.abs(stage.fit.theta)) > FAR else None
     first: list[Candidate | FoundTone] = []
     refused: Candidate | FoundTone | None = None
     looks = 1
     while len(stage.accepted) < MOST_FINDINGS:
         number = FURTHER.get(len(stage.accepted), "first")
         work(f"searching for a {number} cause", 0.0 if stage.accepted else 0.45)
-        ranked, looks = _ranked(stage, visible, given if not stage.accepted else None)
+        ranked, looks = _ranked(stage, visible, start if not stage.accepted else None)
         if not ranked or ranked[0].gain < evidence_threshold(looks):
             break
         step = with_cause(stage, ranked[0])
@@ -162,22 +166,44 @@ def _calibrated(experiment: Experiment, rig: Rig, parameters: Parameters) -> Sta
     """The model's own parameters at their most likely values, without any cause."""
     likelihood = experiment.likelihood(twin(rig), parameters, rig)
     found = fit(likelihood, np.zeros(parameters.n), (), likelihood.nuisance_mean)
+    weighted = experiment.weighted(likelihood, predicted(likelihood, found))
+    if weighted is not experiment:
+        experiment, likelihood = weighted, weighted.again(likelihood)
+        found = fit(likelihood, found.theta, (), found.nuisance)
     likelihood = experiment.surveyed(likelihood, found.nuisance)
     return Stage(experiment, likelihood, found, (), ())
 
 
+def _learned(experiment: Experiment, rig: Rig, parameters: Parameters) -> tuple[Stage, Any | None]:
+    """The model calibrated on a baseline, its error bars aware of how the model errs there, and that."""
+    stage = _calibrated(experiment, rig, parameters)
+    lesson = stage.experiment.lesson_of(stage.likelihood, predicted(stage.likelihood, stage.fit))
+    if lesson is not None:
+        likelihood = lesson.heeded(stage.likelihood)
+        wider = fit(likelihood, stage.fit.theta, (), stage.fit.nuisance, iterations=0)
+        stage = replace(stage, likelihood=likelihood, fit=wider)
+    return stage, lesson
+
+
 def _tightened(parameters: Parameters, known: SpectralFit) -> Parameters:
-    """The parameters with prior widths shrunk to what a baseline left open, never below a tenth of a percent."""
-    spread = np.sqrt(np.diag(known.covariance))[: parameters.n]
-    return replace(parameters, widths=np.maximum(parameters.widths * np.minimum(spread, 1.0), 1e-3))
+    """The parameters with prior widths shrunk to how far each may move before the baseline contradicts.
+
+    Widths are independent, and of all independent priors this one is closest to what the baseline leaves: what moves a
+    resonance stays known, although the baseline does not say which of many stiffnesses brings it where it is.
+
+    Source: Bishop (2006), Pattern Recognition and Machine Learning, section 10.1.2, precisions of the factorized Gaussian.
+    """
+    n = parameters.n
+    spread = 1 / np.sqrt(np.diag(known.information)[:n] + np.diag(known.precision))
+    shrunk = np.maximum(parameters.widths * np.minimum(spread, 1.0), NARROWEST)
+    return replace(parameters, widths=np.minimum(shrunk, parameters.widths))
 
 
 def _ranked(
-    stage: Stage, effects: Mapping[str, type[Effect]], given: SpectralFit | None
+    stage: Stage, effects: Mapping[str, type[Effect]], start: SpectralFit | None
 ) -> tuple[list[Candidate | FoundTone], int]:
     """Candidates for one more cause, best first, and how many were looked at."""
-    far = given is not None and np.max(np.abs(stage.fit.theta)) > FAR
-    anchors = [given] if given is not None and far else []
+    anchors = [] if start is None else [start]
     steady = {
         name: kind
         for name, kind in effects.items()

@@ -31,6 +31,18 @@ class Experiment(Protocol):
         """The likelihood that knows how strongly the structure moves at a fit."""
         ...
 
+    def weighted(self, likelihood: Any, predicted: Complex) -> Experiment:
+        """The data with errors spread as a fit leaves them; the same object where the data say how they are."""
+        ...
+
+    def lesson_of(self, likelihood: Any, predicted: Complex) -> Any | None:
+        """How the model errs in these data; None where that is not asked for."""
+        ...
+
+    def after(self, lesson: Any | None) -> Experiment:
+        """The data seen by one who knows how the model errs where nothing is wrong."""
+        ...
+
     def in_parts(self, likelihood: Any) -> Any | None:
         """The likelihood of consecutive parts, in which drift shows; None where there can be none."""
         ...

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from identification.recording import Array
-from lab.diagnosis.fit import CAUSE_STEP, STEP, moved_by
+from lab.diagnosis.fit import CAUSE_STEP, moved_by
 from lab.diagnosis.misfit import Hypothesis
 from lab.diagnosis.spectral.likelihood import Likelihood
 from lab.diagnosis.spectral.transfer import Complex
@@ -74,15 +74,22 @@ class Point:
 def point(likelihood: Likelihood, theta: Array, causes: Sequence[Hypothesis], nuisance: Array) -> Point:
     """The prediction and -2 log posterior at given values."""
     predicted = likelihood.predict(theta, causes, nuisance)
+    level = objective(likelihood, theta, nuisance, predicted)
+    return Point(theta, tuple(causes), nuisance, predicted, level)
+
+
+def objective(likelihood: Likelihood, theta: Array, nuisance: Array, predicted: Complex) -> float:
+    """-2 log posterior of values and their prediction, up to a constant."""
     off = (nuisance - likelihood.nuisance_mean) / likelihood.nuisance_width
     prior = float(theta @ likelihood.parameters.precision @ theta + off @ off)
     deviance = likelihood.deviance(predicted) if np.all(np.isfinite(predicted)) else np.inf
-    return Point(theta, tuple(causes), nuisance, predicted, deviance + prior)
+    return deviance + prior
 
 
 def slopes(likelihood: Likelihood, at: Point) -> Array:
     """Whitened derivative of the prediction by every variable, (n_variables, n_values)."""
-    changes = [*_theta_slopes(likelihood, at), *_cause_slopes(likelihood, at)]
+    near = likelihood.around(at.theta, at.causes, at.nuisance)
+    changes = [*near.slopes(at.predicted), *_cause_slopes(likelihood, at)]
     nuisance = likelihood.nuisance_slopes(at.theta, at.causes, at.nuisance)
     shape = at.predicted.shape
     changes += [np.broadcast_to(each, shape) for each in nuisance]
@@ -157,15 +164,6 @@ def system(likelihood: Likelihood, at: Point, J: Array, error: Array) -> tuple[A
     prior[range(last, size), range(last, size)] = likelihood.nuisance_width**-2.0
     off = np.concatenate([at.theta, np.zeros(last - n), at.nuisance - likelihood.nuisance_mean])
     return J @ error + prior @ off, J @ J.T + prior
-
-
-def _theta_slopes(likelihood: Likelihood, at: Point) -> list[Complex]:
-    found = []
-    for j in range(at.theta.size):
-        theta = at.theta.copy()
-        theta[j] += STEP
-        found.append((likelihood.predict(theta, at.causes, at.nuisance) - at.predicted) / STEP)
-    return found
 
 
 def _cause_slopes(likelihood: Likelihood, at: Point) -> list[Complex]:

@@ -11,6 +11,7 @@ from typing import Protocol
 
 from identification.recording import Array
 from lab.diagnosis.misfit import Hypothesis, Parameters
+from lab.diagnosis.spectral.neighbourhood import Neighbourhood
 from lab.diagnosis.spectral.transfer import Complex
 from lab.effects.survey import Survey
 from lab.plant import Plant
@@ -48,6 +49,10 @@ class Likelihood(Protocol):
 
     def predict(self, theta: Array, causes: Sequence[Hypothesis], nuisance: Array) -> Complex:
         """The prediction; not finite where the parameters make no sense."""
+        ...
+
+    def around(self, theta: Array, causes: Sequence[Hypothesis], nuisance: Array) -> Neighbourhood:
+        """Predictions of models near one."""
         ...
 
     def nuisance_slopes(self, theta: Array, causes: Sequence[Hypothesis], nuisance: Array) -> Complex:

@@ -130,6 +130,17 @@ class Recorded:
         power = np.exp(nuisance[: likelihood.n_forces])
         return replace(likelihood, survey=self._survey(likelihood.survey.rig, likelihood.twin, power))
 
+    def weighted(self, likelihood: Ambient, predicted: Complex) -> Recorded:
+        """The same: how spectra scatter is known."""
+        return self
+
+    def lesson_of(self, likelihood: Ambient, predicted: Complex) -> None:
+        """None: errors of a model in spectra are not told from those of the data."""
+
+    def after(self, lesson: None) -> Recorded:
+        """The same."""
+        return self
+
     def again(self, likelihood: Ambient) -> Ambient:
         """The likelihood of the training samples as they are now, with tones taken out."""
         first = likelihood.data[0].bands

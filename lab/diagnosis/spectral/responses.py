@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -10,17 +10,18 @@ import scipy.stats
 
 from identification.recording import Array
 from identification.response import FrequencyResponse
-from lab.diagnosis.misfit import Hypothesis, Parameters
+from lab.diagnosis.misfit import Parameters
 from lab.diagnosis.outcome import SpectralPrediction
 from lab.diagnosis.spectral.fit import SpectralFit
-from lab.diagnosis.spectral.likelihood import explained
+from lab.diagnosis.spectral.lesson import Lesson, lesson_of
 from lab.diagnosis.spectral.motion import survey_of
+from lab.diagnosis.spectral.response_likelihood import ResponseLikelihood
+from lab.diagnosis.spectral.scale import Scale
+from lab.diagnosis.spectral.spread import noise_floors, spread_of
 from lab.diagnosis.spectral.tones import FoundTone
-from lab.diagnosis.spectral.transfer import Complex, plant_response
+from lab.diagnosis.spectral.transfer import Complex
 from lab.effects.effect import Effect
-from lab.effects.survey import Survey
 from lab.errors import LabError
-from lab.plant import Plant
 from lab.rig import Rig
 from lab.twin import Twin
 
@@ -45,81 +46,16 @@ VISIBLE = (
     "actuator_lag",
 )
 """Causes that show in frequency responses."""
-
-
-@dataclass(frozen=True, eq=False)
-class ResponseLikelihood:
-    """Frequency responses against the twin of a model; noise of every pair of channels at its most likely level.
-
-    There are no nuisances.
-
-    Attributes:
-        twin: of the model.
-        parameters: of the model.
-        survey: of rig and data.
-        frequency_hz: (n_f,).
-        values: (n_f, n_outputs, n_inputs).
-        spread: standard deviation of each value but for one factor per pair, likewise.
-        decay: rate of the exponential window behind the responses [1/s].
-        dt: sample time [s]; zero for forces that vary continuously.
-    """
-
-    twin: Twin
-    parameters: Parameters
-    survey: Survey
-    frequency_hz: Array
-    values: Complex
-    spread: Array
-    decay: float
-    dt: float
-    nuisance_mean: Array
-    nuisance_width: Array
-
-    @property
-    def band_hz(self) -> tuple[float, float]:
-        """Lowest and highest frequency of the data [Hz]."""
-        return float(self.frequency_hz[0]), float(self.frequency_hz[-1])
-
-    def plant(self, theta: Array, causes: Sequence[Hypothesis] = ()) -> Plant:
-        """The plant at parameters `theta` with causes in it."""
-        return explained(self.twin.changed(*self.parameters.factors(theta)), causes, self.survey)
-
-    def predict(self, theta: Array, causes: Sequence[Hypothesis], nuisance: Array) -> Complex:
-        """H of the model, (n_f, n_outputs, n_inputs)."""
-        # Under e^{-γt} on forces and readings alike every pole moves by -γ: H(s) is seen at s + γ.
-        shifted = self.frequency_hz - 1j * self.decay / (2 * np.pi)
-        plant = self.plant(theta, causes)
-        return plant_response(plant, np.asarray(shifted, dtype=np.complex128), dt=self.dt)[
-            :, :, : len(plant.inputs)
-        ]
-
-    def nuisance_slopes(self, theta: Array, causes: Sequence[Hypothesis], nuisance: Array) -> Complex:
-        """None."""
-        return np.zeros((0, *self.values.shape), dtype=complex)
-
-    def deviance(self, predicted: Complex) -> float:
-        """2 n_f Σ log σ² over all pairs, their noise at its most likely level.
-
-        Source: Pintelon and Schoukens (2012), System Identification, 2nd ed., section 9.2, the variance unknown.
-        """
-        power = self._power(predicted)
-        if not np.all(np.isfinite(power)):
-            return np.inf
-        return float(2 * self.frequency_hz.size * np.sum(np.log(np.maximum(power, 1e-300))))
-
-    def whitened(self, predicted: Complex, changes: Complex) -> Array:
-        """Changes over their standard deviation, real and imaginary parts."""
-        rows = np.sqrt(2) * changes / (self.spread * np.sqrt(self._power(predicted)))
-        rows = rows.reshape(len(changes), -1)
-        return np.concatenate([rows.real, rows.imag], axis=1)
-
-    def error(self, predicted: Complex) -> Complex:
-        """H of the model less H measured."""
-        return np.asarray(predicted - self.values)
-
-    def _power(self, predicted: Complex) -> Array:
-        """Mean squared error of every pair in units of its spread, (n_outputs, n_inputs)."""
-        return np.asarray(np.mean(np.abs(self.error(predicted) / self.spread) ** 2, axis=0))
+HIDDEN: dict[str, tuple[str, ...]] = {
+    "known": (),
+    "unknown per input": ("actuator_gain",),
+    "unknown per response": ("actuator_gain", "sensor_gain"),
+}
+"""Those of them that an unknown scale hides."""
+SCALE_UNKNOWN = (
+    "the scale of the responses is unknown: all masses, stiffnesses and dampings together are known only as well as before; "
+    "calibrate the measuring chain, or weigh one body"
+)
 
 
 @dataclass(frozen=True, eq=False)
@@ -129,16 +65,26 @@ class Responses:
     Attributes:
         response: the lines used.
         spread: standard deviation of each value, or what is proportional to it.
+        stated: whether the data say what it is proportional to.
         known: whether it is the standard deviation itself.
         whole: whether fits may see all lines.
+        floors: size of each response up to which errors are even, (n_outputs, n_inputs); infinite where they are all along.
+        lesson: how the model errs where nothing is wrong; None where no baseline told.
     """
 
     response: FrequencyResponse
     spread: Array
+    stated: bool
     known: bool
     whole: bool
+    floors: Array
+    lesson: Lesson | None = None
 
-    visible = VISIBLE
+    @property
+    def visible(self) -> tuple[str, ...]:
+        """Causes that show in the responses: no gain that their unknown scale takes up."""
+        hidden = HIDDEN[self.response.scale]
+        return tuple(cause for cause in VISIBLE if cause not in hidden)
 
     @classmethod
     def of(
@@ -165,7 +111,8 @@ class Responses:
             spread = np.maximum(spread, 1e-6 * np.abs(response.values).max(axis=0))
         elif response.weight is not None:
             spread = spread / np.maximum(response.weight, 1e-12)[:, None, None]
-        return cls(response, spread, known, whole)
+        stated = known or response.coherence is not None or response.weight is not None
+        return cls(response, spread, stated, known, whole, np.full(spread.shape[1:], np.inf))
 
     def likelihood(self, twin: Twin, parameters: Parameters, rig: Rig) -> ResponseLikelihood:
         """The likelihood of the training lines."""
@@ -181,11 +128,33 @@ class Responses:
             output_rms=rms,
             top_hz=None if r.dt else float(r.frequency_hz[-1]),
         )
-        none = np.zeros(0)
+        scale = Scale.of(r.scale, len(r.outputs), n)
         found = ResponseLikelihood(
-            twin, parameters, survey, r.frequency_hz, r.values, self.spread, r.decay, r.dt, none, none
+            twin, parameters, survey, r.frequency_hz, r.values, self.spread, r.decay, r.dt, scale
         )
-        return _lines(found, self._training)
+        found = _lines(found, self._training)
+        H = found.unscaled(np.zeros(parameters.n), ())
+        found = replace(found, scale=scale.estimated(H, found.values))
+        return found if self.lesson is None else self.lesson.heeded(found)
+
+    def weighted(self, likelihood: ResponseLikelihood, predicted: Complex) -> Responses:
+        """The responses with errors spread over their lines as a fit leaves them, where the data do not say how."""
+        if self.stated:
+            return self
+        floors = noise_floors(likelihood.values, likelihood.error(predicted))
+        return replace(self, spread=spread_of(self.response.values, floors), floors=floors)
+
+    def lesson_of(self, likelihood: ResponseLikelihood, predicted: Complex) -> Lesson:
+        """How the model errs in these responses."""
+        return lesson_of(likelihood, predicted, self.floors)
+
+    def after(self, lesson: Lesson | None) -> Responses:
+        """The responses seen by one who knows how the model errs where nothing is wrong."""
+        if lesson is None or self.stated:
+            return replace(self, lesson=lesson)
+        return replace(
+            self, lesson=lesson, spread=spread_of(self.response.values, lesson.floors), stated=True
+        )
 
     def surveyed(self, likelihood: ResponseLikelihood, nuisance: Array) -> ResponseLikelihood:
         """The same: what moves the structure is known."""
@@ -217,9 +186,12 @@ class Responses:
     def left(self, likelihood: ResponseLikelihood, predicted: Complex) -> str:
         """Where the error of a response is more than noise, in a sentence; empty where it is not.
 
-        With a known variance each line's squared error is chi-squared with two degrees of freedom; without one, noise is no
-        more alike on neighbouring lines than chance (the largest of all correlations, Bonferroni).
+        After a baseline it may be as large as there. With a known variance each line's squared error is chi-squared with two
+        degrees of freedom; without one, noise is no more alike on neighbouring lines than chance (the largest of all
+        correlations, Bonferroni).
         """
+        if self.lesson is not None:
+            return self._beyond(self.lesson.excess(likelihood, predicted))
         e = likelihood.error(predicted) / likelihood.spread
         return self._too_large(e) if self.known else self._alike(e)
 
@@ -234,8 +206,8 @@ class Responses:
         return self
 
     def again(self, likelihood: ResponseLikelihood) -> ResponseLikelihood:
-        """The same."""
-        return likelihood
+        """The same likelihood with errors spread as they are now."""
+        return replace(likelihood, spread=self.spread[self._training])
 
     def shown(
         self, held_out: ResponseLikelihood, predicted: tuple[Complex, Complex, Complex]
@@ -252,11 +224,12 @@ class Responses:
 
     def warnings(self, likelihood: ResponseLikelihood, nominal: ResponseLikelihood) -> list[str]:
         """What these data cannot tell."""
-        said = [
+        said = [SCALE_UNKNOWN] if self.response.scale != "known" else []
+        said += [
             "frequency responses are averages at one level: laws that are not linear do not show; "
             "record a test in time for them"
         ]
-        if len(self.response.inputs) == 1:
+        if self.response.scale == "known" and len(self.response.inputs) == 1:
             said.append(
                 "with one input its gain cannot be told from a common scale of masses, stiffnesses and dampings, nor from a "
                 "common gain of all sensors; calibrate the load cell, or weigh one body"
@@ -267,6 +240,14 @@ class Responses:
     def _training(self) -> np.ndarray:
         lines = np.arange(self.response.frequency_hz.size)
         return np.ones(lines.size, bool) if self.whole else lines % EVERY < EVERY - BLOCKS
+
+    def _beyond(self, excess: tuple[float, tuple[int, int]] | None) -> str:
+        if excess is None:
+            return ""
+        return (
+            f"something is left that no cause in the catalogue explains: the error of {self._pair(*excess[1])} is "
+            f"{excess[0]:.3g} times that of the model in the baseline"
+        )
 
     def _too_large(self, e: Complex) -> str:
         n = e.shape[0]

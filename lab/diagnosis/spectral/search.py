@@ -27,6 +27,8 @@ WORTH = -5.0
 """Score below which a refit is not worth its time: chance scores lower than the price of a variable."""
 HOPELESS = -20.0
 """Gain after a rough refit below which no polish helps."""
+REACH = 2.0
+"""By what factor a fit may move the frequency of an oscillator."""
 STRENGTH = {"attached_oscillator": ("mass", 1), "sensor_delay": ("delay", 1), "sensor_lag": ("corner_hz", -1)}
 """For causes whose guesses have an effect: the variable that scales it, and which way."""
 
@@ -92,7 +94,12 @@ def search(
     if any(cause.kind.cause == "attached_oscillator" for cause in present.causes):
         # One more degree of freedom is all that a twin can grow.
         effects = {name: kind for name, kind in effects.items() if name != "attached_oscillator"}
-    proposed = [h for h in hypotheses(likelihood, effects) if (h.kind, h.location) not in taken]  # type: ignore[arg-type]
+    low, high = likelihood.band_hz
+    proposed = [
+        h
+        for h in hypotheses(likelihood, effects)  # type: ignore[arg-type]
+        if (h.kind, h.location) not in taken and plausible(h, (low / REACH, high * REACH))
+    ]
     picked = [(present, h) for h in _best(screen(likelihood, present, proposed))]
     for anchor in anchors:
         picked += [(anchor, h) for h in _best(screen(likelihood, anchor, proposed))]

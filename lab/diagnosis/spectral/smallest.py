@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 from typing import NamedTuple
 
 import numpy as np
+import scipy.optimize
 
 from identification.recording import Array
 from lab.diagnosis.changes import OWN_PARAMETERS
@@ -18,6 +19,8 @@ from lab.effects.effect import Effect
 
 STEP = 1e-3
 """Of a drift, in units of its scale."""
+ENDS = 5
+"""Parameters told at either end where there are many."""
 LARGEST = float(np.log(1e3))
 """A change of the logarithm of a factor beyond which none is looked for."""
 
@@ -35,7 +38,9 @@ class Smallest(NamedTuple):
 
 
 def smallest_changes(likelihood: Likelihood, found: SpectralFit, needed: float) -> dict[str, list[Smallest]]:
-    """Smallest change of every mass, stiffness and damping that is named, by cause, smallest first.
+    """Smallest change of masses, stiffnesses and dampings that is named, by cause, smallest first.
+
+    Of many of a kind only those are told that the data see best and worst.
 
     Args:
         likelihood: model and data.
@@ -48,7 +53,7 @@ def smallest_changes(likelihood: Likelihood, found: SpectralFit, needed: float) 
     named: dict[str, list[Smallest]] = {}
     for group, cause in OWN_PARAMETERS.items():
         sizes = []
-        for j in parameters.group(group):
+        for j in _extremes(found, [j for j in parameters.group(group) if parameters.widths[j] > 0]):
             free = parameters.lifted(np.eye(n)[j]).precision
 
             def gain(x: float, j: int = j, free: Array = free) -> float:
@@ -59,6 +64,15 @@ def smallest_changes(likelihood: Likelihood, found: SpectralFit, needed: float) 
             sizes.append(Smallest(parameters.names[j].partition(" ")[2], _least(gain, needed, width)))
         named[cause] = sorted(sizes, key=lambda each: each.size)
     return named
+
+
+def _extremes(found: SpectralFit, members: Sequence[int]) -> list[int]:
+    """The parameters that the data see best and worst beside all others, all where they are few."""
+    if len(members) <= 2 * ENDS:
+        return list(members)
+    variance = np.diag(found.covariance)
+    ranked = sorted(members, key=lambda j: float(variance[j]))
+    return [*ranked[:ENDS], *ranked[-ENDS:]]
 
 
 def smallest_drifts(
@@ -124,13 +138,17 @@ def _exact(found: SpectralFit) -> SpectralFit:
 
 def _least(gain: Callable[[float], float], needed: float, width: float) -> float:
     """The smallest change that gains what is needed, to a percent, in units in which a prior has that width."""
-    low, high = 0.0, LARGEST
-    if gain(high / width) < needed:
+    if gain(LARGEST / width) < needed:
         return np.inf
-    while high - low > 0.01 * high:
-        middle = 0.5 * (low + high)
-        low, high = (low, middle) if gain(middle / width) >= needed else (middle, high)
-    return high
+    if gain(0.0) >= needed:
+        return 0.0
+
+    def short(square: float) -> float:
+        return gain(np.sqrt(square) / width) - needed
+
+    # What is gained grows about as the square, on which few trials find the root.
+    root = scipy.optimize.brentq(short, 0.0, LARGEST**2, xtol=1e-12, rtol=0.02)
+    return float(np.sqrt(root))
 
 
 def _cost(found: SpectralFit) -> float:
