@@ -81,7 +81,7 @@ def stiff_springs(
     beside nominal ones, since without the spring these may have gone far to make up for it.
     """
     seen, followed = _windowed(misfit), []
-    for theta in work.each((present.theta, present.theta - misfit.parameters.precision @ present.theta)):
+    for theta in work.each((present.theta, misfit.parameters.nominal(present.theta))):
         reference = _level(seen, present, theta, present.causes) - WORTH
         best = []
         for h in proposed:

@@ -157,6 +157,10 @@ class Parameters:
         values, vectors = np.linalg.eigh(self.precision)
         return np.asarray(vectors[:, values < 0.5])
 
+    def nominal(self, theta: Array) -> Array:
+        """The parameters where only what has no prior is not as the model says."""
+        return np.asarray(self.free @ (self.free.T @ theta))
+
     def is_free(self, direction: Array) -> bool:
         """Whether most of a direction (n,) has no prior any more."""
         v = direction / np.linalg.norm(direction)

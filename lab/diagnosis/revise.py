@@ -28,8 +28,8 @@ def restarted(misfit: Misfit, found: Fit) -> Fit:
 
     While a cause is missing, the model's parameters are led astray by it, and behind kinks they may not find back.
     """
-    free = misfit.parameters.free
-    again = tried(misfit, free @ (free.T @ found.theta), found.causes, found.observer, iterations=15)
+    nominal = misfit.parameters.nominal(found.theta)
+    again = tried(misfit, nominal, found.causes, found.observer, iterations=15)
     return found if again is None else min(found, again, key=lambda f: f.objective)
 
 

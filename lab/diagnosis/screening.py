@@ -27,10 +27,31 @@ _Start = tuple[Hypothesis, Array, Array, Array, float, float]
 
 @dataclass(frozen=True, eq=False)
 class Screened:
-    """Score of one hypothesis after a few steps with the model's parameters projected out."""
+    """Score of one hypothesis after a few steps from `theta` with the model's parameters projected out."""
 
     hypothesis: Hypothesis
+    theta: Array
     score: float
+
+
+@dataclass(frozen=True, eq=False)
+class Screening:
+    """What screening tells.
+
+    Attributes:
+        rows: hypotheses by falling score: the likelihood gained in a few steps, less the price of their variables.
+        lucky: the best score that each of many draws of mere noise would have given.
+        base: -2 log posterior that scores are counted from.
+    """
+
+    rows: list[Screened]
+    lucky: Array
+    base: float
+
+    def beside(self, other: Screening) -> Screening:
+        """Both, all scores counted from this one's base."""
+        moved = [replace(row, score=row.score + self.base - other.base) for row in other.rows]
+        return replace(self, rows=sorted(self.rows + moved, key=lambda row: -row.score))
 
 
 def hypotheses(misfit: Misfit, effects: Mapping[str, type[Effect]]) -> list[Hypothesis]:
@@ -54,11 +75,8 @@ def screen(
     observer: Array,
     proposed: Sequence[Hypothesis],
     work: Work = UNHEARD,
-) -> tuple[list[Screened], Array]:
-    """Hypotheses by falling score: the likelihood gained in a few steps, less the price of their variables.
-
-    Beside them, the best score that each of many draws of mere noise would have given.
-    """
+) -> Screening:
+    """Every hypothesis tried cheaply beside the causes present, and what the luckiest would have gained from noise."""
     n_train = tuple(min(n, SCREEN_SAMPLES) for n in misfit.n_train)
     if not misfit.plant(theta, present).laws:
         misfit = replace(misfit, substeps=SCREEN_SUBSTEPS)
@@ -141,5 +159,5 @@ def screen(
     lucky = np.max([NO_CHANCE, *(each for _, each in looks)], axis=0)
     first = sorted((started for started, _ in looks), key=lambda started: -score(started))
     again = list(following.each(POOL.map(followed, first[:STEPPED_ON]), STEPPED_ON))
-    rows = [Screened(started[0], score(started)) for started in again + first[STEPPED_ON:]]
-    return sorted(rows, key=lambda row: -row.score), lucky
+    rows = [Screened(started[0], theta, score(started)) for started in again + first[STEPPED_ON:]]
+    return Screening(sorted(rows, key=lambda row: -row.score), lucky, base)

@@ -19,7 +19,7 @@ from lab.diagnosis.misfit import Hypothesis, Misfit
 from lab.diagnosis.observer import kalman_gain
 from lab.diagnosis.places import echoes, mends
 from lab.diagnosis.plausible import plausible
-from lab.diagnosis.screening import hypotheses, screen
+from lab.diagnosis.screening import Screened, hypotheses, screen
 from lab.diagnosis.tolerance import confirmed, wrong_parameters
 from lab.effects.effect import Effect
 
@@ -27,6 +27,8 @@ REFITTED, PER_CAUSE, POLISHED = 10, 2, 3
 KEPT = 5
 """Candidates kept after each stage of their refits, besides those that are as good within `CLOSE`."""
 CLOSE = 30.0
+FAR = 4.0
+"""Widths beyond which a parameter may have gone to make up for a cause, which then shows better from the model as given."""
 COSTS = 26.0, 18.0, 3.0, 1.0, 3.0, 1.0
 """Of screening, refits, polish, the model's own parameters, large changes and stiff springs, as measured."""
 NEGLIGIBLE = 1e-3
@@ -58,19 +60,14 @@ def search(
     proposed = [
         h for h in proposed if not mends(h.kind, h.location, found, survey) and not echoes(h, causes, survey)
     ]
-    rows, lucky = screen(misfit, theta, causes, observer, proposed, screening)
-    picked: list[Hypothesis] = []
-    places: set[tuple[str, str, str]] = set()
-    for row in rows:
-        h = row.hypothesis
-        key = (h.kind.cause, h.location, str(h.guess.fixed))
-        same = sum(other.kind is h.kind and other.guess.fixed == h.guess.fixed for other in picked)
-        if key not in places and same < PER_CAUSE and len(picked) < REFITTED and row.score > -30:
-            picked.append(h)
-            places.add(key)
+    screened = screen(misfit, theta, causes, observer, proposed, screening)
+    nominal = misfit.parameters.nominal(theta)
+    if np.max(np.abs(theta - nominal)) > FAR:
+        observer = kalman_gain(misfit, nominal, calibration.share) if observer.size else observer
+        screened = screened.beside(screen(misfit, nominal, causes, observer, proposed))
     without = minus_two_log_evidence(present)
     own_and_named = {**OWN_CHANGES, **effects}
-    refits = _refitted(calibration, theta, present, picked, refitting)
+    refits = _refitted(calibration, present, _picked(screened.rows), refitting)
     scored = sorted((last_of(f, g, without) for f, g in refits), key=lambda c: -c.gain)
     best = [_polished(misfit, c, without) for c in polishing.each(scored[:POLISHED])] + scored[POLISHED:]
     own = sorted(wrong_parameters(misfit, present, without, own_and_named), key=lambda c: -c.gain)
@@ -92,11 +89,26 @@ def search(
     ranked: dict[tuple[str, str], Candidate] = {}
     for candidate in sorted(candidates, key=lambda c: -c.gain):
         ranked.setdefault((candidate.cause, candidate.location), candidate)
-    return list(ranked.values()), quantile(lucky, misfit.parameters.n_factors)
+    return list(ranked.values()), quantile(screened.lucky, misfit.parameters.n_factors)
+
+
+def _picked(rows: Sequence[Screened]) -> list[Screened]:
+    """The best, at most so many, and of each cause at most so many places."""
+    picked: list[Screened] = []
+    places: set[tuple[str, str, str]] = set()
+    for row in rows:
+        h = row.hypothesis
+        key = (h.kind.cause, h.location, str(h.guess.fixed))
+        others = (each.hypothesis for each in picked)
+        same = sum(other.kind is h.kind and other.guess.fixed == h.guess.fixed for other in others)
+        if key not in places and same < PER_CAUSE and len(picked) < REFITTED and row.score > -30:
+            picked.append(row)
+            places.add(key)
+    return picked
 
 
 def _refitted(
-    calibration: Calibration, theta: Array, present: Fit, picked: Sequence[Hypothesis], work: Work
+    calibration: Calibration, present: Fit, picked: Sequence[Screened], work: Work
 ) -> list[tuple[Fit, Fit | None]]:
     """Complete fits with each new cause, trusting the measurements less and less; the hopeless are dropped on the way.
 
@@ -107,7 +119,7 @@ def _refitted(
         [] if present.causes else [s for s in (calibration.share, calibration.share / 10) if s > NEGLIGIBLE]
     )
     running: list[tuple[Array, tuple[Hypothesis, ...], Fit | None]] = [
-        (theta, (*present.causes, h), None) for h in picked
+        (row.theta, (*present.causes, row.hypothesis), None) for row in picked
     ]
     *leading_, rough, whole = work.parts(*[3.0 for _ in shares], 2.0, 3.0)
     for share, part in zip(shares, leading_, strict=True):

@@ -1,0 +1,33 @@
+"""Screening ranks causes, also where calibration has gone far to make up for one."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from lab.diagnosis.misfit import Parameters
+from lab.diagnosis.screening import Screened, Screening
+
+
+def row(score):
+    return Screened(None, np.zeros(1), score)
+
+
+def test_scores_of_two_starts_are_counted_from_one_base():
+    far = Screening([row(5.0), row(-1.0)], np.array([2.0]), base=100.0)
+    # From a start that is worse by 900, a gain of 1000 ends 100 lower than the other start.
+    nominal = Screening([row(1000.0), row(800.0)], np.array([9.0]), base=1000.0)
+    both = far.beside(nominal)
+    assert [each.score for each in both.rows] == pytest.approx([100.0, 5.0, -1.0, -100.0], abs=1e-12)
+    assert (both.base, both.lucky[0]) == (100.0, 2.0)
+
+
+def test_nominal_keeps_what_has_no_prior():
+    parameters = Parameters(("mass a", "mass b", "mass c"), np.full(3, 0.01), 3, 0, np.eye(3))
+    theta = np.array([3.0, -2.0, 7.0])
+    assert parameters.nominal(theta) == pytest.approx([0, 0, 0], abs=1e-12)
+    one = parameters.lifted(np.array([0.0, 0.0, 1.0]))
+    assert one.nominal(theta) == pytest.approx([0, 0, 7], abs=1e-12)
+    together = parameters.lifted(np.array([1.0, 1.0, 0.0]))
+    assert together.nominal(theta) == pytest.approx([0.5, 0.5, 0], abs=1e-12)
+    assert replace(parameters, precision=1e-6 * np.eye(3)).nominal(theta) == pytest.approx(theta, rel=1e-12)
