@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -26,12 +27,14 @@ class Baseline:
         power: residual over signal power of every output.
         colour: samples of the residual that count as one.
         samples: of the residual, counted so.
+        gains: relative standard deviation of the gain of each input that is not known exactly, by name of the input.
     """
 
     fit: Fit
     power: Array
     colour: float
     samples: float
+    gains: Mapping[str, float]
 
     @classmethod
     def of(cls, calibration: Calibration) -> Baseline:
@@ -40,7 +43,12 @@ class Baseline:
         alike = colour(residual)
         coloured = replace(calibration.misfit, colour=alike)
         found = fit(coloured, calibration.fit.theta, iterations=2)
-        return cls(found, _power(coloured, found), alike, residual.shape[1] / alike)
+        parameters, stds = coloured.parameters, np.sqrt(np.diag(found.covariance))
+        gains = {
+            parameters.names[i].partition(" ")[2]: float(parameters.widths[i] * stds[i])
+            for i in range(parameters.n_structural, parameters.n_factors)
+        }
+        return cls(found, _power(coloured, found), alike, residual.shape[1] / alike, gains)
 
     def covers(self, misfit: Misfit, found: Fit) -> bool:
         """Whether a fit of another recording leaves no more of its signals than the baseline of its own.

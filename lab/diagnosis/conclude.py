@@ -144,6 +144,8 @@ def conclude(
     if refused is not None:
         verdict = UNEXPLAINED
         warnings.append(words.not_to_be_named(refused.cause, refused.location))
+    if known is not None and findings:
+        warnings += [words.shared(name, std) for name, std in known.gains.items()]
     alternatives = _alternatives(first) if findings else ()
     warnings += words.inseparable(alternatives)
     return Diagnosis(

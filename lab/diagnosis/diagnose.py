@@ -164,9 +164,16 @@ def _like(baseline: Recording, recording: Recording) -> Recording:
 
 
 def _tightened(parameters: Parameters, known: Fit) -> Parameters:
-    """The parameters with prior widths shrunk to what a baseline left open, never below a tenth of a percent."""
-    spread = np.sqrt(np.diag(known.covariance))[: parameters.n_factors]
-    return replace(parameters, widths=np.maximum(parameters.widths * np.minimum(spread, 1.0), 1e-3))
+    """The parameters with prior widths shrunk to what a baseline left open, never below a tenth of a percent.
+
+    Gains stay what the baseline made of them: what drives the structure is the same, and only ratios to its scale are sought.
+    """
+    n, total = parameters.n_structural, known.theta.size
+    precision = known.information[:total, :total] + known.precision
+    others = [i for i in range(total) if not n <= i < parameters.n_factors]
+    spread = np.sqrt(np.diag(np.linalg.pinv(precision[np.ix_(others, others)], rcond=1e-14, hermitian=True)))
+    widths = np.maximum(parameters.widths[:n] * np.minimum(spread[:n], 1.0), 1e-3)
+    return replace(parameters, names=parameters.names[:n], widths=widths, precision=np.eye(n), inputs=())
 
 
 def _with(state: State, candidate: Candidate, rig: Rig) -> State:

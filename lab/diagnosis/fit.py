@@ -63,7 +63,9 @@ class Fit:
 
 def objective(residual: Array, theta: Array, precision: Array, colour: float = 1.0) -> float:
     """-2 log posterior with the noise of every channel at its most likely level; `colour` samples count as one."""
-    power = np.mean(residual**2, axis=1)
+    # A trial far from any sense may overflow before it diverges.
+    with np.errstate(over="ignore"):
+        power = np.mean(residual**2, axis=1)
     if not np.all(np.isfinite(power)):
         return np.inf
     n = residual.shape[1] / colour

@@ -77,6 +77,14 @@ def not_to_be_named(cause: str, location: str) -> str:
     )
 
 
+def shared(name: str, std: float) -> str:
+    """What the uncertain gain of an input means for all that was found beside a baseline."""
+    return (
+        f"the gain of {name} stays what the baseline made of it, known to {100 * std:.2g} %: changes in kg, N/m and N s/m "
+        "share this error with the model itself; relative changes do not"
+    )
+
+
 def as_in_the_baseline(power: Array, recording: Recording) -> str:
     """What is left, where that is no more than the baseline leaves."""
     shares = ", ".join(

@@ -10,6 +10,7 @@ from lab.diagnosis.misfit import Misfit
 from lab.diagnosis.outcome import CONSISTENT, EXPLAINED
 from lab.diagnosis.spectral.diagnose import diagnose_spectra
 from lab.effects.actuator_gain import ActuatorGain
+from lab.effects.mass_change import MassChange
 from lab.errors import LabError
 from lab.excitation import Random
 from lab.instruments import instrument
@@ -73,3 +74,22 @@ def test_no_cause_is_made_of_what_a_width_covers(rig, recording):
     known = lab.diagnose(recording, rig)
     assert known.verdict == EXPLAINED
     assert [(f.effect.cause, f.effect.location) for f in known.findings] == [("actuator_gain", "force2")]
+
+
+@pytest.mark.slow
+def test_a_change_beside_a_baseline_is_told_whatever_the_gain(rig, recording):
+    stronger = ActuatorGain("force2", relative_change=TRUE - 1).apply(rig)
+    loaded = MassChange("mass2", delta_mass=0.3).apply(stronger)
+    after = simulate(
+        instrument(loaded, noise_percent=1.0), Random(rms=1.0), sample_rate=5.0, duration=200.0, seed=5
+    )
+    open_ = {"mass": 0.1, "stiffness": 0.1, "gain": 0.14}
+    diagnosis = lab.diagnose(after, rig, baseline=recording, widths=open_)
+    assert diagnosis.verdict == EXPLAINED
+    (finding,) = diagnosis.findings
+    assert (finding.effect.cause, finding.effect.location) == ("mass_change", "mass2")
+    # Both gains are known up to one factor at best, and so is the mass.
+    shared = [warning for warning in diagnosis.warnings if "stays what the baseline made of it" in warning]
+    assert len(shared) == 2
+    mass = diagnosis.calibration["mass mass2"]
+    assert mass.value / mass.nominal == pytest.approx(2.3 / 2.0, abs=4 * mass.std / mass.nominal)
