@@ -25,6 +25,7 @@ from lab.checks.missing import missing
 from lab.checks.quantization import quantization
 from lab.checks.rate import rate
 from lab.checks.remark import SEVERITIES, Remark
+from lab.checks.saturation import saturation
 from lab.checks.scale import scale
 from lab.checks.spikes import spikes
 from lab.checks.survey import Survey
@@ -44,6 +45,7 @@ CHECKS: dict[str, Callable[[Survey], list[Remark]]] = {
     "rate": rate,
     "units": units,
     "clipping": clipping,
+    "saturation": saturation,
     "jumps": jumps,
     "dropouts": dropouts,
     "spikes": spikes,

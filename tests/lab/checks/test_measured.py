@@ -80,6 +80,18 @@ def test_releases_of_a_cart_that_sticks_in_the_end_are_clean(side):
         assert lab.check(cart(folder, ("m",), "free_decay", 0.01)) == [], folder.name
 
 
-def test_a_second_encoder_without_a_cart_is_dead():
+def test_a_second_encoder_without_a_cart_is_dead_and_the_current_reading_levels_off():
     made = cart("current_sensor_saturation/Positive_saturation", ("V", "V", "A", "m", "m"), factor=0.01)
-    assert [(r.check, r.channel) for r in lab.check(made)] == [("dead", "m4")]
+    remarks = lab.check(made)
+    # The cart that the motor holds against its stop stays as well.
+    expected = {("dead", "m4"), ("saturation", "A2"), ("saturation", "m3")}
+    assert {(r.check, r.channel) for r in remarks} == expected
+    (current,) = [r for r in remarks if r.channel == "A2"]
+    # Documented as about 4.4 A; this record stays between 4.0 and 4.3.
+    assert 4.0 < current.evidence["level"] < 4.4
+
+
+@pytest.mark.parametrize("folder", ["random_one_cart/KmNoM", "amplitude_series_one_cart/Klow_3V_pulses"])
+def test_currents_within_their_range_do_not_level_off(folder):
+    columns = ("V", "A", "m") if "series" in folder else ("A", "m", "m")
+    assert "saturation" not in {r.check for r in lab.check(cart(folder, columns, factor=0.01))}
