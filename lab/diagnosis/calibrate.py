@@ -13,6 +13,7 @@ from lab.diagnosis.fit import Fit, fit
 from lab.diagnosis.misfit import Misfit, Parameters
 from lab.diagnosis.observer import kalman_gain
 from lab.diagnosis.starts import best_starts, moving, starts_of, with_starts
+from lab.diagnosis.whiteness import whiteness
 from lab.effects.survey import Survey
 from lab.plant import Path, ready
 from lab.rig import Rig
@@ -74,6 +75,11 @@ def gain_names(twin: Twin) -> list[str]:
 def calibrate(misfit: Misfit, rig: Rig, work: Work = UNHEARD) -> Calibration:
     """The most likely parameters of the model as it is, without any cause."""
     theta = np.zeros(misfit.parameters.n)
+    direct = fit(misfit, theta, iterations=20)
+    if whiteness(direct.residual, misfit.driven).white:
+        # Where nothing but noise is left, no detour would end anywhere better.
+        misfit = replace(misfit, survey=survey_of(misfit, rig, direct.theta, direct.residual))
+        return Calibration(misfit, direct, direct, 0.0)
     misfit = replace(misfit, survey=survey_of(misfit, rig, theta))
     rough = fit(misfit, theta, observer=kalman_gain(misfit, theta, SHARES[0]), iterations=4)
     theta = rough.theta
@@ -92,7 +98,7 @@ def calibrate(misfit: Misfit, rig: Rig, work: Work = UNHEARD) -> Calibration:
     start_theta = theta if share else plain.theta
     guided = fit(misfit, start_theta, observer=kalman_gain(misfit, start_theta, share), iterations=5)
     again = fit(misfit, guided.theta, iterations=20)
-    best = min(plain, again, key=lambda f: f.objective)
+    best = min(plain, again, *(() if late else (direct,)), key=lambda f: f.objective)
     misfit = replace(misfit, survey=survey_of(misfit, rig, best.theta, best.residual))
     return Calibration(misfit, best, guided, share)
 
