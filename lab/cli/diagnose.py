@@ -82,7 +82,7 @@ def command(
             folder,
             baseline=baseline,
             mapping=mapping,
-            widths=numbers("--widths", widths, "NAME=SHARE", "damping=0.5"),
+            widths=numbers("--widths", widths, "NAME=SHARE", "damping=0.5", zero=True),
             effects=named(effects) or None,
             force=force,
             command=typed(),

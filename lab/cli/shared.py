@@ -93,7 +93,9 @@ def named(words: Sequence[str]) -> tuple[str, ...]:
     return tuple(name for word in words for each in word.split(",") if (name := each.strip()))
 
 
-def numbers(option: str, words: Sequence[str], form: str, example: str) -> dict[str, float]:
+def numbers(
+    option: str, words: Sequence[str], form: str, example: str, *, zero: bool = False
+) -> dict[str, float]:
     """Positive numbers by name, from texts such as name=0.1.
 
     Args:
@@ -101,6 +103,7 @@ def numbers(option: str, words: Sequence[str], form: str, example: str) -> dict[
         words: as typed, one by one or with commas between them.
         form: NAME=NUMBER in the words of the option.
         example: of a word that is right.
+        zero: whether a number may be nil.
 
     Raises:
         UsageError: a word has another form, or its number is not positive and finite.
@@ -114,7 +117,7 @@ def numbers(option: str, words: Sequence[str], form: str, example: str) -> dict[
             number = float("nan")
         if not name or math.isnan(number):
             raise click.UsageError(f"{option} is {word!r}; expected {form}, such as {example}.")
-        if not 0 < number < math.inf:
+        if not 0 < number < math.inf and not (zero and number == 0):
             raise click.UsageError(f"{option} is {word!r}; expected a positive number, such as {example}.")
         found[name] = number
     return found

@@ -39,13 +39,15 @@ def changes(
         starts: points from which large changes are tried, with the same causes.
     """
     without = _cost(present)
-    small = wrong_parameters(likelihood, present, without, effects)  # type: ignore[arg-type]
+    proposed = list(_open(likelihood, effects))
+    names = {(cause, location) for cause, location, _ in proposed}
+    wrong = wrong_parameters(likelihood, present, without, effects)  # type: ignore[arg-type]
+    small = [c for c in wrong if (c.cause, c.location) in names]
     small.sort(key=lambda c: -c.gain)
     confirmed = [_confirmed(likelihood, present, c, without) for c in small[:CONFIRMED]]
     # What was not confirmed may not rank before what was.
     weakest = min((c.gain for c in confirmed), default=0.0)
     rest = [replace(c, gain=min(c.gain, weakest)) for c in small[CONFIRMED:]]
-    proposed = list(_open(likelihood, effects))
     large = _large(likelihood, effects, starts, without)
     return [*confirmed, *rest, *large], len(proposed)
 

@@ -7,6 +7,7 @@ import pytest
 
 from lab.diagnosis.calibrate import parameters_of
 from lab.diagnosis.outcome import EXPLAINED
+from lab.diagnosis.spectral.changes import changes
 from lab.diagnosis.spectral.diagnose import diagnose_spectra
 from lab.diagnosis.spectral.fit import fit
 from lab.diagnosis.spectral.lesson import LEVEL, lesson_of
@@ -157,3 +158,16 @@ def test_a_baseline_covers_errors_as_large_as_its_own_and_no_larger(rig):
     twice = replace(again, values=predicted + 2 * (again.values - predicted))
     ratio, _ = lesson.excess(twice, predicted)
     assert ratio == pytest.approx(2.0, rel=0.3)
+
+
+def test_a_number_that_is_known_is_no_candidate(rig):
+    data = responses(EFFECTS["mass_change"]("mass5", delta_mass=0.1).apply(rig), 0.01, 5, 0.0)
+    parameters = parameters_of(twin(rig), {"mass": 0.0, "mass mass3": 0.005})
+    likelihood = Responses.of(data, band=None).likelihood(twin(rig), parameters, rig)
+    found = fit(likelihood, np.zeros(21), (), likelihood.nuisance_mean, iterations=3)
+    only = {"mass_change": EFFECTS["mass_change"]}
+    candidates, looks = changes(likelihood, found, only, [found])
+    assert looks == 1
+    assert {c.location for c in candidates} <= {"mass3"}
+    known = [k for k, name in enumerate(parameters.names) if name.startswith("mass") and name != "mass mass3"]
+    np.testing.assert_array_equal(found.theta[known], 0.0)
