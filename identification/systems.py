@@ -128,7 +128,8 @@ class StateSpace:
         s = 2j * np.pi * np.asarray(frequency_hz)
         points = np.exp(s * self.dt) if self.dt else s
         eye = np.eye(self.n_states)
-        return np.stack([self.C @ np.linalg.solve(p * eye - self.A, self.B) + self.D for p in points])
+        H = [self.C @ np.linalg.solve(p * eye - self.A, self.B) + self.D for p in points]
+        return np.array(H, dtype=np.complex128).reshape(len(H), *self.D.shape)
 
     def simulate(self, inputs: Array, initial: Array | None = None) -> Array:
         """Outputs (n_outputs, n_samples) of a sampled model under inputs (n_inputs, n_samples).

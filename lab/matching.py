@@ -99,6 +99,31 @@ def matched(rig: Rig, recording: Recording | FrequencyResponse) -> Rig:
     )
 
 
+def placed(recording: Measured, rig: Rig) -> Measured:
+    """The recording with its channels at the degrees of freedom where the model has them.
+
+    A channel that the model lacks, such as one more sensor on a floor, stays as it is.
+
+    Raises:
+        UnknownNameError: the model has none of the recorded outputs.
+    """
+    everything = rig.with_chain(replace(rig.chain, inputs=None, outputs=None))
+    known = {
+        side: {channel.name: channel.dof for channel in getattr(everything, side) if channel.dof}
+        for side in SIDES
+    }
+    if not any(channel.name in known["outputs"] for channel in recording.outputs):
+        raise UnknownNameError(
+            f"none of the outputs {', '.join(channel.name for channel in recording.outputs)} reads a place of model "
+            f"{rig.name!r}; expected some of {', '.join(known['outputs']) or 'none'}; rename them with --map FILE.toml"
+        )
+    inputs, outputs = (
+        tuple(replace(channel, dof=known[side].get(channel.name, channel.dof)) for channel in channels)
+        for side, channels in (("inputs", recording.inputs), ("outputs", recording.outputs))
+    )
+    return replace(recording, inputs=inputs, outputs=outputs)
+
+
 def same_channels(
     baseline: Recording | FrequencyResponse, recording: Recording | FrequencyResponse
 ) -> Recording | FrequencyResponse:

@@ -20,10 +20,12 @@ from lab.compare import compare
 from lab.criteria import judge
 from lab.errors import RigError
 from lab.files.folder import output_folder
+from lab.files.model import load_model
 from lab.files.recording import load
 from lab.files.recording_responses import load_responses, only_responses
 from lab.instruments import instrument
 from lab.loads import Sampling
+from lab.matching import Names, placed, read_mapping, renamed
 from lab.present import present
 from lab.result import Result
 from lab.rig import Rig
@@ -87,6 +89,8 @@ def identify_file(
     method: str | None = None,
     order: int | None = None,
     refine: bool = False,
+    model: str | Path | None = None,
+    mapping: str | Path | Names | None = None,
     force: bool = False,
     command: str = "",
     progress: Progress | None = None,
@@ -100,6 +104,9 @@ def identify_file(
         method: name, as in `lab list methods`; chosen from the data when None.
         order: number of states; chosen from the data when None.
         refine: move modes and matrices to the maximum of the likelihood; needs measured forces, or free decays.
+        model: file or name of a model that says which degree of freedom each channel drives or reads, and in whose shape
+            modes are shown in motion; nothing of its numbers is used.
+        mapping: file that renames channels as the model has them, or the names themselves (see `lab.matching`).
         force: replace an earlier output there.
         command: how the lab was called, for the report.
         progress: told what is being done, and the share of it that is done.
@@ -110,17 +117,21 @@ def identify_file(
     """
     with output_folder(out, force=force) as folder:
         data: Recording | FrequencyResponse
+        names = read_mapping(mapping) if isinstance(mapping, str | Path) else mapping or {}
+        rig = None if model is None else load_model(model)
         if only_responses(path):
             if refine:
                 raise RecordingError(f"{path} holds frequency responses alone; to refine, samples are needed")
-            data = load_responses(path)
+            data = renamed(load_responses(path), names)
+            data = data if rig is None else placed(data, rig)
             Work(progress).called("identifying")
             result = examine_responses(data, method, order=order, **settings)
         else:
-            data = load(path)
+            data = renamed(load(path), names)
+            data = data if rig is None else placed(data, rig)
             result = examine(data, method, order=order, refine=refine, progress=progress, **settings)
         writing = Work(progress).called("writing the report")
-        present(folder, result, data, command=command, source=path, work=writing)
+        present(folder, result, data, command=command, rig=rig, source=path, work=writing)
     return result
 
 

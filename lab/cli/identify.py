@@ -7,7 +7,17 @@ from pathlib import Path
 import click
 
 from lab.cli.progress import Bar
-from lab.cli.shared import FILE, example, method_options, name_of_recording, output_options, tell, typed
+from lab.cli.shared import (
+    FILE,
+    example,
+    map_option,
+    method_options,
+    model_option,
+    name_of_recording,
+    output_options,
+    tell,
+    typed,
+)
 
 
 @click.command(
@@ -23,6 +33,8 @@ from lab.cli.shared import FILE, example, method_options, name_of_recording, out
     help="Move modes, and M, C, K where the set-up allows, to the maximum of the likelihood, with its error bars; "
     "needs measured forces, or free decays.",
 )
+@model_option("The structure, in MJCF: which place each channel reads, and what moves in the viewer.")
+@map_option
 @output_options("out/NAME_modes")
 def command(
     recording: Path,
@@ -33,6 +45,8 @@ def command(
     method: str | None,
     order: int | None,
     refine: bool,
+    model: str | None,
+    mapping: Path | None,
 ) -> None:
     """Modes, and M, C, K where the set-up allows, of any recording, real or virtual.
 
@@ -49,6 +63,8 @@ def command(
             method=method,
             order=order,
             refine=refine,
+            model=model,
+            mapping=mapping,
             force=force,
             command=typed(),
             progress=progress,
