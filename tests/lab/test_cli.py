@@ -411,7 +411,7 @@ OPTIONS = {
     "view": "",
     "import": "--out --force --json --quiet",
     "check": "--model --map --json --quiet",
-    "identify": "--method --order --out --force --json --quiet",
+    "identify": "--method --order --model --map --out --force --json --quiet",
     "diagnose": "--model --map --effects --widths --out --force --json --quiet",
     "place": "--model --effects --seed --out --force --json --quiet",
     "study": "--seed --out --force --json --quiet",
