@@ -145,6 +145,7 @@ def fit(
     refresh: int = 2,
     tolerance: float = 0.5,
     n_train: Sequence[int] | None = None,
+    slopes: Array | None = None,
 ) -> Fit:
     """Parameters and causes at the most likely values near where they start.
 
@@ -157,14 +158,17 @@ def fit(
         refresh: iterations for which slopes of the parameters are kept.
         tolerance: stop when an iteration with fresh slopes gains less than this in -2 log posterior.
         n_train: samples of each record to use; all training samples when None.
+        slopes: of the residual by the parameters, of a model close to the one at the start, (n_parameters, n_outputs, n_total);
+            they count as one iteration old.
     """
     causes = tuple(causes)
     theta = np.asarray(theta, dtype=float)
     n = theta.size
     e = misfit.residual(theta, causes, observer=observer, n_train=n_train)
     P = misfit.parameters.precision
-    f, damping, age = objective(e, theta, P, misfit.colour), 1e-3, refresh
-    slopes = np.zeros((0, *e.shape))
+    f, damping = objective(e, theta, P, misfit.colour), 1e-3
+    age = refresh if slopes is None else 1
+    slopes = np.zeros((0, *e.shape)) if slopes is None else slopes
     size = n + sum(cause.n for cause in causes)
     prior = np.zeros((size, size))
     prior[:n, :n] = P

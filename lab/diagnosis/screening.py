@@ -21,8 +21,13 @@ SCREEN_SUBSTEPS = 3
 STEPPED_ON = 40
 """Hypotheses that get more than one step in the screening."""
 
+SCREEN_VALUES = 32768
+"""Samples of all outputs together that are enough to rank causes by."""
+
 _Start = tuple[Hypothesis, Array, Array, Array, float, float]
 """A hypothesis, its residual, what is left of it with the model's parameters projected out, these, objective, damping."""
+_Look = tuple[Hypothesis, float, float]
+"""A hypothesis, objective and damping: residuals of all hypotheses at once would fill the memory."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -75,9 +80,22 @@ def screen(
     observer: Array,
     proposed: Sequence[Hypothesis],
     work: Work = UNHEARD,
+    *,
+    share: float = 1.0,
 ) -> Screening:
-    """Every hypothesis tried cheaply beside the causes present, and what the luckiest would have gained from noise."""
-    n_train = tuple(min(n, SCREEN_SAMPLES) for n in misfit.n_train)
+    """Every hypothesis tried cheaply beside the causes present, and what the luckiest would have gained from noise.
+
+    Args:
+        misfit: model and data.
+        theta: parameters of the model.
+        present: causes so far.
+        observer: gain that pulls the state to the measurements.
+        proposed: causes to try.
+        work: told of every hypothesis.
+        share: of the samples that are usually looked at.
+    """
+    most = int(share * min(SCREEN_SAMPLES, SCREEN_VALUES // misfit.measured.shape[0]))
+    n_train = tuple(min(n, most) for n in misfit.n_train)
     if not misfit.plant(theta, present).laws:
         misfit = replace(misfit, substeps=SCREEN_SUBSTEPS)
     e = misfit.residual(theta, present, observer=observer, n_train=n_train)
@@ -130,34 +148,42 @@ def screen(
             damping = max(damping, 1e-2) * 10
         return started
 
-    def score(started: _Start) -> float:
-        h, f = started[0], started[4]
+    def score(look: _Look) -> float:
+        h, f, _ = look
         found = base - f - max(h.n, 1) * float(np.log(e.size))
         return found if np.isfinite(found) else -np.inf
 
-    def looked_at(h: Hypothesis) -> tuple[_Start, Array]:
-        """A hypothesis after one step, and what it would have gained from noise."""
+    def started(h: Hypothesis, damping: float) -> _Start:
         r = misfit.residual(theta, [*present, h], observer=observer, n_train=n_train)
-        started: _Start = (h, r, *projected(r), 1e-2)
-        if not (h.n and np.isfinite(started[4])):
-            return started, NO_CHANCE
-        own, follow = own_slopes(h, r)
-        lucky = chance.tones if tone(h) is not None else chance.gains(own * w[:, None])
-        return stepped(started, own, follow), lucky
+        return (h, r, *projected(r), damping)
 
-    def followed(started: _Start) -> _Start:
-        """A start after a few steps more."""
-        for _ in range(3 if started[0].n and np.isfinite(started[4]) else 0):
-            before = started[4]
-            started = stepped(started, *own_slopes(started[0], started[1]))
-            if before - started[4] < 1:
+    def looked_at(h: Hypothesis) -> tuple[_Look, Array]:
+        """A hypothesis after one step, and what it would have gained from noise."""
+        start = started(h, 1e-2)
+        if not (h.n and np.isfinite(start[4])):
+            return (h, *start[4:]), NO_CHANCE
+        own, follow = own_slopes(h, start[1])
+        lucky = chance.tones if tone(h) is not None else chance.gains(own * w[:, None])
+        start = stepped(start, own, follow)
+        return (start[0], *start[4:]), lucky
+
+    def followed(look: _Look) -> _Look:
+        """A hypothesis after a few steps more."""
+        h, f, damping = look
+        if not (h.n and np.isfinite(f)):
+            return look
+        start = started(h, damping)
+        for _ in range(3):
+            before = start[4]
+            start = stepped(start, *own_slopes(start[0], start[1]))
+            if before - start[4] < 1:
                 break
-        return started
+        return (start[0], *start[4:])
 
     looking, following = work.parts(len(proposed), STEPPED_ON)
     looks = list(looking.each(POOL.map(looked_at, proposed), len(proposed)))
     lucky = np.max([NO_CHANCE, *(each for _, each in looks)], axis=0)
-    first = sorted((started for started, _ in looks), key=lambda started: -score(started))
+    first = sorted((look for look, _ in looks), key=lambda look: -score(look))
     again = list(following.each(POOL.map(followed, first[:STEPPED_ON]), STEPPED_ON))
-    rows = [Screened(started[0], theta, score(started)) for started in again + first[STEPPED_ON:]]
+    rows = [Screened(look[0], theta, score(look)) for look in again + first[STEPPED_ON:]]
     return Screening(sorted(rows, key=lambda row: -row.score), lucky, base)

@@ -14,7 +14,7 @@ from lab.diagnosis.candidate import Candidate, last_of
 from lab.diagnosis.chance import quantile
 from lab.diagnosis.changes import OWN_CHANGES, large_changes, stiff_springs
 from lab.diagnosis.evidence import minus_two_log_evidence
-from lab.diagnosis.fit import Fit, fit
+from lab.diagnosis.fit import Fit, fit, theta_slopes
 from lab.diagnosis.misfit import Hypothesis, Misfit
 from lab.diagnosis.observer import kalman_gain
 from lab.diagnosis.places import echoes, mends
@@ -60,11 +60,15 @@ def search(
     proposed = [
         h for h in proposed if not mends(h.kind, h.location, found, survey) and not echoes(h, causes, survey)
     ]
-    screened = screen(misfit, theta, causes, observer, proposed, screening)
     nominal = misfit.parameters.nominal(theta)
-    if np.max(np.abs(theta - nominal)) > FAR:
+    if np.max(np.abs(theta - nominal)) <= FAR:
+        screened = screen(misfit, theta, causes, observer, proposed, screening)
+    else:
+        # What moves parameters that far shows in half the samples, too.
+        near, far = screening.parts(1.0, 1.0)
+        screened = screen(misfit, theta, causes, observer, proposed, near, share=0.5)
         observer = kalman_gain(misfit, nominal, calibration.share) if observer.size else observer
-        screened = screened.beside(screen(misfit, nominal, causes, observer, proposed))
+        screened = screened.beside(screen(misfit, nominal, causes, observer, proposed, far, share=0.5))
     without = minus_two_log_evidence(present)
     own_and_named = {**OWN_CHANGES, **effects}
     refits = _refitted(calibration, present, _picked(screened.rows), refitting)
@@ -128,8 +132,22 @@ def _refitted(
             for theta, causes, _ in part.each(running)
         ]
         running = [(f.theta, f.causes, f) for f in leading([f for f in led if f is not None])]
+    # Causes are small at first: those who start together share the slopes of the model without them.
+    slopes = {} if shares else _shared_slopes(misfit, present, [row.theta for row in picked])
     first = [
-        (tried(misfit, theta, causes, present.observer, iterations=2, tolerance=1), guided)
+        (
+            tried(
+                misfit,
+                theta,
+                causes,
+                present.observer,
+                iterations=2,
+                refresh=3,
+                tolerance=1,
+                slopes=slopes.get(id(theta)),
+            ),
+            guided,
+        )
         for theta, causes, guided in rough.each(running)
     ]
     plain = {id(f): guided for f, guided in first if f is not None}
@@ -141,6 +159,16 @@ def _refitted(
     return [(f, guided) for f, guided in found if f is not None]
 
 
+def _shared_slopes(misfit: Misfit, present: Fit, starts: Sequence[Array]) -> dict[int, Array]:
+    """Slopes of the parameters beside the causes present, by the identity of the start."""
+    slopes = {}
+    for theta in starts:
+        if id(theta) not in slopes:
+            e = misfit.residual(theta, present.causes, observer=present.observer)
+            slopes[id(theta)] = theta_slopes(misfit, theta, present.causes, present.observer, e, None)
+    return slopes
+
+
 def tried(
     misfit: Misfit,
     theta: Array,
@@ -148,11 +176,22 @@ def tried(
     observer: Array,
     *,
     iterations: int,
+    refresh: int = 2,
     tolerance: float = 0.5,
+    slopes: Array | None = None,
 ) -> Fit | None:
     """A fit, or nothing where it fails."""
     try:
-        found = fit(misfit, theta, causes, observer=observer, iterations=iterations, tolerance=tolerance)
+        found = fit(
+            misfit,
+            theta,
+            causes,
+            observer=observer,
+            iterations=iterations,
+            refresh=refresh,
+            tolerance=tolerance,
+            slopes=slopes,
+        )
     except (np.linalg.LinAlgError, ValueError):
         return None
     finite = np.isfinite(found.objective) and np.all(np.isfinite(found.information))
