@@ -1,7 +1,5 @@
 """Force laws that MJCF has no words for: silent in plain MuJoCo, acting in the lab, and leaving no trace behind."""
 
-import threading
-
 import mujoco
 import numpy as np
 import pytest
@@ -75,25 +73,6 @@ def test_callbacks_of_others_come_back():
         assert data.act_dot[0] == 7.0
     finally:
         mujoco.set_mjcb_act_dyn(None)
-
-
-def test_threads_take_turns():
-    model, done = sprung("hysteresis").model, threading.Event()
-
-    def other():
-        with laws.acting(model):
-            done.set()
-
-    thread = threading.Thread(target=other)
-    with laws.acting(model):
-        own = mujoco.get_mjcb_act_dyn()
-        thread.start()
-        # Long enough for a thread that does not wait, which takes microseconds.
-        assert not done.wait(0.1)
-        assert mujoco.get_mjcb_act_dyn() is own
-    thread.join(10.0)
-    assert done.is_set()
-    assert mujoco.get_mjcb_act_dyn() is None
 
 
 def test_no_law_no_callback():
