@@ -9,7 +9,6 @@ from __future__ import annotations
 import xml.etree.ElementTree as ET
 from collections.abc import Iterator
 from contextlib import contextmanager
-from threading import RLock
 
 import mujoco
 import numpy as np
@@ -20,7 +19,6 @@ from lab.rig import Rig, Spring
 
 HYSTERESIS, DRIFT = "hysteresis", "drift"
 USER_BIAS = int(mujoco.mjtBias.mjBIAS_USER)
-_TURN = RLock()
 
 
 def with_hysteresis(rig: Rig, spring: Spring, stiffness: float, yield_displacement: float) -> Rig:
@@ -51,22 +49,18 @@ def set_duration(model: mujoco.MjModel, duration: float) -> None:
 
 @contextmanager
 def acting(model: mujoco.MjModel) -> Iterator[None]:
-    """Lets the force laws of a model act, if it has any; other threads wait for their turn.
-
-    MuJoCo has one callback of each kind for the whole process, and Python runs one thread at a time anyhow.
-    """
+    """Lets the force laws of a model act, if it has any."""
     if not np.any(is_law(model)):
         yield
         return
-    with _TURN:
-        before = mujoco.get_mjcb_act_dyn(), mujoco.get_mjcb_act_bias()
-        mujoco.set_mjcb_act_dyn(_bouc_wen)
-        mujoco.set_mjcb_act_bias(_drifting)
-        try:
-            yield
-        finally:
-            mujoco.set_mjcb_act_dyn(before[0])
-            mujoco.set_mjcb_act_bias(before[1])
+    before = mujoco.get_mjcb_act_dyn(), mujoco.get_mjcb_act_bias()
+    mujoco.set_mjcb_act_dyn(_bouc_wen)
+    mujoco.set_mjcb_act_bias(_drifting)
+    try:
+        yield
+    finally:
+        mujoco.set_mjcb_act_dyn(before[0])
+        mujoco.set_mjcb_act_bias(before[1])
 
 
 def _bouc_wen(model: mujoco.MjModel, data: mujoco.MjData, actuator: int) -> float:

@@ -6,14 +6,13 @@ MuJoCo's own XML writer rounds numbers to six digits, so a rig keeps and edits t
 from __future__ import annotations
 
 import xml.etree.ElementTree as ET
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
 
 import mujoco
 
 from lab.errors import FileError, RigError
-from lab.hook import Hook
 
 
 def read(path: Path) -> str:
@@ -71,32 +70,14 @@ def compiled(xml: str, folder: Path | None, source: str) -> mujoco.MjModel:
 
 @contextmanager
 def quiet() -> Iterator[list[str]]:
-    """Collects MuJoCo's warnings, which it would write to a log file in the working directory.
-
-    MuJoCo does not say which thread it warns of: who listens at the same time hears the warnings of others, too.
-    """
+    """Collects MuJoCo's warnings, which it would write to a log file in the working directory."""
     complaints: list[str] = []
-    with _WARNINGS.held():
-        _listening[id(complaints)] = complaints
-        try:
-            yield complaints
-        finally:
-            del _listening[id(complaints)]
-
-
-def _listen() -> Callable[[], None]:
     before = mujoco.get_mju_user_warning()
-    mujoco.set_mju_user_warning(_heard)
-    return lambda: mujoco.set_mju_user_warning(before)
-
-
-def _heard(complaint: str) -> None:
-    for complaints in list(_listening.values()):
-        complaints.append(complaint)
-
-
-_WARNINGS = Hook(_listen)
-_listening: dict[int, list[str]] = {}
+    mujoco.set_mju_user_warning(complaints.append)
+    try:
+        yield complaints
+    finally:
+        mujoco.set_mju_user_warning(before)
 
 
 def anchor(root: ET.Element, folder: Path) -> None:

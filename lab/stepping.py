@@ -230,10 +230,8 @@ class Stepper:
         if not broken.any():
             return
         time = float(np.max(previous[:, int(np.argmax(broken))]))
-        # A model in another thread, with more degrees of freedom, may have complained too.
-        found = [int(dof) for dof in re.findall(r"DOF (\d+)", " ".join(complaints))]
-        named = [self.rig.dofs[dof] for dof in found if dof < len(self.rig.dofs)]
-        where = f" at degree of freedom {named[0]!r}" if named else ""
+        dof = re.search(r"DOF (\d+)", complaints[0]) if complaints else None
+        where = f" at degree of freedom {self.rig.dofs[int(dof[1])]!r}" if dof else ""
         raise DivergedError(
             f"the simulation of {self.rig.name!r} diverged near t = {time:.4g} s{where}; check for negative stiffness or "
             "damping, lower the force, or ask for more accuracy"
