@@ -8,7 +8,7 @@ import numpy as np
 
 from identification.progress import UNHEARD, Work
 from identification.recording import Array, Recording
-from lab.diagnosis.fit import POOL, Fit
+from lab.diagnosis.fit import Fit
 from lab.diagnosis.misfit import Misfit
 from lab.diagnosis.outcome import Errors, Prediction
 from lab.diagnosis.starts import start_of
@@ -44,11 +44,12 @@ def predictions_of(
         motions = [None if start is None else start_of(rig, dofs, start) for start in begins]
         return replay(rig, recording, accuracy=accuracy, starts=motions)
 
+    # One after the other: MuJoCo's callbacks belong to the whole process.
     return tuple(
         Prediction(measured, nominal, calibrated, extended, first)
         for (_, measured), nominal, calibrated, extended, first in zip(
             misfit.records,
-            *work.each(POOL.map(simulated, rigs, starts), len(rigs)),
+            *work.each(map(simulated, rigs, starts), len(rigs)),
             misfit.n_train,
             strict=True,
         )
