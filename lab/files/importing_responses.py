@@ -34,17 +34,20 @@ def responses_of(sources: Sequence[Source], recipe: Recipe) -> FrequencyResponse
     inputs, to_input = _channels(recipe.inputs, sources[0], "inputs")
     outputs, to_output = _channels(recipe.outputs, sources[0], "outputs")
     by_name = {source.path.name: source for source in sources}
-    frequency = _frequency(sources[0], recipe.frequency)
+    every = _frequency(sources[0], recipe.frequency)
+    # What lies outside may be anything, also not a number.
+    kept = _kept(every, recipe.frequency)
+    frequency = every[kept]
     values = np.full((frequency.size, len(outputs), len(inputs)), np.nan, dtype=complex)
     for part in recipe.responses:
         source = _source(part, by_name)
-        if not np.array_equal(_frequency(source, recipe.frequency), frequency):
+        if not np.array_equal(_frequency(source, recipe.frequency), every):
             raise FileError(f"{source.path.name}: has other frequencies than {sources[0].path.name}")
         row, column = _position(part.output, outputs, "outputs"), _position(part.input, inputs, "inputs")
         if not np.isnan(values[:, row, column]).all():
             raise FileError(f"the response of {part.output!r} to {part.input!r} is given twice")
-        derived = (2j * np.pi * frequency) ** part.derivatives
-        values[:, row, column] = _values(source, part) / derived * to_output[row] / to_input[column]
+        H = _integrated(_values(source, part)[kept], frequency, part)
+        values[:, row, column] = H * to_output[row] / to_input[column]
     lacking = np.argwhere(np.isnan(values).all(axis=0))
     if lacking.size:
         row, column = lacking[0]
@@ -52,8 +55,7 @@ def responses_of(sources: Sequence[Source], recipe: Recipe) -> FrequencyResponse
             f"the response of {outputs[row].name!r} to {inputs[column].name!r} is missing in [[responses]]"
         )
     try:
-        response = FrequencyResponse(frequency, values, 0.0, inputs, outputs, scale=recipe.frequency.scale)
-        return response.between(recipe.frequency.lowest, recipe.frequency.highest or np.inf)
+        return FrequencyResponse(frequency, values, 0.0, inputs, outputs, scale=recipe.frequency.scale)
     except IdentificationError as error:
         raise FileError(str(error)) from None
 
@@ -95,6 +97,28 @@ def _frequency(source: Source, part: FrequencyPart) -> np.ndarray:
     if not np.isfinite(frequency).all() or not np.all(np.diff(frequency) > 0):
         raise FileError(f"{source.path.name}: frequencies do not rise from line to line; expected them to")
     return frequency
+
+
+def _kept(frequency: np.ndarray, part: FrequencyPart) -> np.ndarray:
+    """Which lines lie between the lowest and the highest that are wanted."""
+    highest = np.inf if part.highest is None else part.highest
+    kept = (frequency >= part.lowest) & (frequency <= highest)
+    if not kept.any():
+        raise FileError(
+            f"no line lies between {part.lowest:g} and {highest:g} Hz; there are {frequency.size} from {frequency[0]:g} to "
+            f"{frequency[-1]:g} Hz"
+        )
+    return np.asarray(kept)
+
+
+def _integrated(values: np.ndarray, frequency: np.ndarray, part: ResponsePart) -> np.ndarray:
+    """Values without the time derivatives that they have beyond their units."""
+    if part.derivatives > 0 and not frequency.all():
+        raise FileError(
+            f"the response of {part.output!r} to {part.input!r} is a time derivative, which tells nothing at 0 Hz; set lowest "
+            "above 0 in [frequency]"
+        )
+    return np.asarray(values * (2j * np.pi * frequency) ** -part.derivatives)
 
 
 def _position(name: str, channels: Sequence[Channel], side: str) -> int:

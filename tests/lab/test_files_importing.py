@@ -156,6 +156,18 @@ phase_unit = "deg"
     np.testing.assert_allclose(
         jerk.values[:, 0, 0], (response.values[:, 0, 0] / (2j * np.pi * f))[1:6], rtol=1e-13
     )
+    # A line at 0 Hz has no derivative to be undone; an integral has.
+    columns[0, 0] = 0.0
+    with pytest.raises(FileError, match="tells nothing at 0 Hz; set lowest above 0"):
+        read_foreign(table(tmp_path, columns), parse_recipe(recipe + "derivatives = 1\n"))
+    save_imported(
+        read_foreign(table(tmp_path, columns), parse_recipe(recipe + "derivatives = -1\n")), tmp_path / "0.h5"
+    )
+    assert load_responses(tmp_path / "0.h5").values[0, 0, 0] == 0
+    with pytest.raises(FileError, match="no line lies between 7 and inf Hz; there are 8 from 0 to"):
+        read_foreign(
+            table(tmp_path, columns), parse_recipe(recipe.replace('unit = "Hz"', 'unit = "Hz"\nlowest = 7.0'))
+        )
 
 
 @pytest.mark.parametrize(
