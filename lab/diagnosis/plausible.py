@@ -6,17 +6,20 @@ from lab.diagnosis.misfit import Hypothesis
 
 
 def plausible(cause: Hypothesis, band_hz: tuple[float, float]) -> bool:
-    """Whether a cause is what its name says: an oscillator oscillates, and at a frequency that the data reach.
+    """Whether a cause is what its name says: a spring holds, drag brakes, and an oscillator oscillates where data reach.
 
     One that resonates far above the band only adds its mass, one far below only a spring to the ground; overdamped it is a
-    damper. Each of these has a name of its own.
+    damper. Each of these has a name of its own. A spring that is missing does not push apart, nor does drag drive: where a fit
+    wants that, something else is at work.
 
     Args:
         cause: at its fitted values.
         band_hz: lowest and highest frequency of the data.
     """
+    values = cause.effect.parameters
+    if any(values[name] < 0 for name in cause.kind.passive):
+        return False
     if cause.kind.cause != "attached_oscillator":
         return True
-    values = cause.effect.parameters
     low, high = band_hz
     return low <= values["frequency_hz"] <= high and values["damping_ratio"] < 1

@@ -37,6 +37,8 @@ class Effect:
     """Unit of every parameter."""
     positive: ClassVar[tuple[str, ...]] = ()
     """Parameters that are positive by nature; fits use their logarithm."""
+    passive: ClassVar[tuple[str, ...]] = ()
+    """Parameters that are positive by nature, too; fits start at zero and may pass it, but no name is given there."""
     grows: ClassVar[bool] = False
     """Whether it adds degrees of freedom: such causes come last, since all others are written in those of the rig."""
     location: str

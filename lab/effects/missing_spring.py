@@ -36,6 +36,7 @@ class MissingSpring(Effect):
 
     cause: ClassVar[str] = "missing_spring"
     units: ClassVar[dict[str, str]] = {"stiffness": "N/m", "damping": "N s/m"}
+    passive: ClassVar[tuple[str, ...]] = ("stiffness",)
     stiffness: float
     damping: float = 0.0
 

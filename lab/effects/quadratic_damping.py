@@ -23,6 +23,7 @@ class QuadraticDamping(AtSpring, Effect):
 
     cause: ClassVar[str] = "quadratic_damping"
     units: ClassVar[dict[str, str]] = {"c2": "N s^2/m^2"}
+    passive: ClassVar[tuple[str, ...]] = ("c2",)
     c2: float
 
     def hide(self, rig: Rig) -> Rig:
