@@ -60,7 +60,7 @@ def write_report(
         compared=_compared(result),
         modes=modes_table(result),
         **_matrices(result),
-        figures=[inline(drawing) for drawing in draw(result, recording, work)],
+        figures=[inline(drawing) for drawing in draw(result, recording, work=work)],
         explanation=result.explanation or " ".join(result.notes),
         warnings=result.warnings,
         command=command,

@@ -14,7 +14,7 @@ def told(folder):
 
 def test_the_report_names_the_files_it_rests_on(tmp_path, monkeypatch):
     """By name and checksum: the recording that was given, or the model file of the scenario."""
-    monkeypatch.setattr("lab.show.report.draw", lambda *_: [])  # no figure matters here
+    monkeypatch.setattr("lab.show.report.draw", lambda *_, **__: [])  # no figure matters here
     rig = chain_rig("chain3_uncoupled", inputs=["force1"], outputs=["acc2.x"])
     source = tmp_path / "measured.h5"
     source.write_bytes(b"samples")

@@ -216,7 +216,7 @@ def test_poor_results_are_reported_too(rig, tmp_path):
 
 
 def test_large_matrices_are_drawn_instead(tmp_path, monkeypatch):
-    monkeypatch.setattr("lab.show.report.draw", lambda *_: [])  # no other figure matters here
+    monkeypatch.setattr("lab.show.report.draw", lambda *_, **__: [])  # no other figure matters here
     rig = chain_rig("truss", inputs=["force_u1"], outputs=["acc1.x"])
     result = chain_result(rig)
     path = tmp_path / "report.html"
@@ -284,7 +284,7 @@ def test_names_in_other_scripts_reach_the_browser(tmp_path):
 
 
 def test_the_criteria_of_the_field_stand_in_a_table_with_their_sources(rig, tmp_path, monkeypatch):
-    monkeypatch.setattr("lab.show.report.draw", lambda *_: [])  # no figure matters here
+    monkeypatch.setattr("lab.show.report.draw", lambda *_, **__: [])  # no figure matters here
     result = chain_result(rig)
     judged = replace(result, criteria=(), validation=validate(result))
     write_report(tmp_path / "report.html", judged, pulse_recording(rig))

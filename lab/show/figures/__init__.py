@@ -24,7 +24,7 @@ Figure = Callable[[], Drawing | None]
 """Draws one, where the data support it."""
 
 
-def draw(result: Result, recording: Recording | FrequencyResponse, work: Work = UNHEARD) -> list[Drawing]:
+def draw(result: Result, recording: Recording | FrequencyResponse, *, work: Work = UNHEARD) -> list[Drawing]:
     """All figures that the data support, in the order of the report, each told of as it is drawn."""
     figures = (
         _of_responses(result, recording)
