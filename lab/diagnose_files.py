@@ -135,6 +135,8 @@ def _named(path: str | Path, names: Names) -> Diagnosed:
 
 
 def _widths(given: Mapping[str, float], rig: Rig) -> Mapping[str, float]:
+    if not given:
+        return given
     model = twin(rig)
     known = (*WIDTHS, "gain", *parameters_of(model).names, *gain_names(model))
     for name in given:
