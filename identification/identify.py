@@ -78,8 +78,8 @@ def identify(
         order: number of states; None sweeps the order and keeps the modes that stay put, or takes the rank of
             the data when they are free of noise.
         dofs: names of the degrees of freedom of M, C and K in the order wanted.
-        uncertainty: whether to find the standard deviations of modes and matrices too, which costs about as much
-            again as the estimates.
+        uncertainty: whether to find the standard deviations of modes and matrices too, which costs up to about ten
+            times as much as the estimates.
         refine: whether to move modes and matrices to the maximum of the likelihood, whatever method they come from;
             only with measured forces, or free decays. Their standard deviations are then those of the likelihood.
         progress: told what is being done, and how much of it is done.

@@ -9,8 +9,16 @@ import numpy as np
 import scipy.linalg
 
 from identification.errors import RecordingError
-from identification.recording import Array, Recording
-from identification.regression import BLOCK, FROM_REST, least_squares, rms, triangular
+from identification.recording import Array, Record, Recording
+from identification.regression import (
+    BLOCK,
+    FROM_REST,
+    LONG,
+    factor_of_products,
+    least_squares,
+    rms,
+    triangular,
+)
 from identification.systems import Complex, StateSpace
 
 
@@ -19,8 +27,8 @@ def fit_inputs(system: StateSpace, recording: Recording) -> StateSpace:
 
     A and C stay. The initial state of each record is fitted with them, except where the kind of record
     says that it starts from rest. Every output counts relative to its RMS. In modal coordinates, x_r(k)
-    is the input filtered by 1 / (z - z_r), so the regression needs one filter per pole and input,
-    whatever the number of outputs.
+    is the input filtered by 1 / (z - z_r), so the regression needs one filter per pole and input, and one
+    triangular factor of these signals, whatever the number of outputs.
 
     Args:
         system: sampled model with the channels of the recording; a pole outside the unit circle must not
@@ -28,8 +36,7 @@ def fit_inputs(system: StateSpace, recording: Recording) -> StateSpace:
         recording: records with inputs.
 
     Returns:
-        The model; least squares by orthogonal factorization, block by block, so long records need
-        little memory.
+        The model; least squares block by block, so long records need little memory.
 
     Raises:
         RecordingError: the channels are not those of the model.
@@ -47,10 +54,15 @@ def fit_inputs(system: StateSpace, recording: Recording) -> StateSpace:
     z, phi = z[own], phi[:, own]
     # One of each conjugate pair stands for both: real parts count twice.
     phi = phi * np.where(z.imag > 0, 2.0, 1.0)
+    size = rms(recording)[len(system.inputs) :]
+    scale = 1 / np.where(size > 0, size, 1)
     n_unknown = _n_columns(system, z) + 2 * z.size * len(recording.records)
     R = np.zeros((0, n_unknown + 1))
-    for rows in _rows(system, recording, z, system.C @ phi):
-        R = triangular(R, rows)
+    for number, record in enumerate(recording.records):
+        weights = _weights(system, recording, number, z, system.C @ phi)
+        # All outputs see the same signals, each with weights of its own, so one factor serves them all.
+        seen = _factor(record, z, weights.shape[1])
+        R = triangular(R, np.vstack([seen @ (each * own) for each, own in zip(scale, weights, strict=True)]))
     theta = least_squares(R[:n_unknown, :n_unknown], R[:n_unknown, n_unknown:], 1e-13)[0][:, 0]
     n_inputs, n_outputs = len(system.inputs), len(system.outputs)
     b = theta[: 2 * z.size * n_inputs].reshape(2, z.size, n_inputs)
@@ -62,36 +74,65 @@ def _n_columns(system: StateSpace, z: Complex) -> int:
     return 2 * z.size * len(system.inputs) + system.D.size
 
 
-def _rows(system: StateSpace, recording: Recording, z: Complex, shapes: Complex) -> Iterator[Array]:
-    """Regression rows [B | D | initial states | y] of outputs scaled to unit RMS, block by block."""
+def _weights(system: StateSpace, recording: Recording, number: int, z: Complex, shapes: Complex) -> Array:
+    """What each of the signals of a record counts in the columns [B | D | initial states | y] of each output's regression.
+
+    Shape (n_outputs, n_signals, n_unknowns + 1).
+    """
+    n_outputs, n_inputs = system.D.shape
+    n_forced, n_fixed = z.size * n_inputs, _n_columns(system, z)
+    direct = 2 * n_forced + np.arange(n_inputs)
+    free = 0 if recording.records[number].kind in FROM_REST else 2 * z.size
+    after = 2 * n_forced + n_inputs
+    weights = np.zeros(
+        (n_outputs, after + free + n_outputs, n_fixed + 2 * z.size * len(recording.records) + 1)
+    )
+    for o in range(n_outputs):
+        weights[o, : 2 * n_forced, : 2 * n_forced] = _turned(np.repeat(shapes[o], n_inputs))
+        weights[o, direct, direct + o * n_inputs] = 1
+        if free:
+            own = n_fixed + number * free
+            weights[o, after : after + free, own : own + free] = _turned(shapes[o])
+        weights[o, after + free + o, -1] = 1
+    return weights
+
+
+def _turned(shape: Complex) -> Array:
+    """What Re x and Im x count in Re(ψ x b), by the real and the imaginary part of b, one block each."""
+    re, im = np.diag(shape.real), np.diag(shape.imag)
+    return np.block([[re, -im], [-im, -re]])
+
+
+def _factor(record: Record, z: Complex, n_signals: int) -> Array:
+    """Triangular factor of the signals of a record, through their products where it is long and they have digits enough."""
+    if record.n_samples > LONG:
+        products = sum(X @ X.T for X in _signals(record, z))
+        R = factor_of_products(np.asarray(products), record.n_samples)
+        if R is not None:
+            return R
+    R = np.zeros((0, n_signals))
+    for X in _signals(record, z):
+        R = triangular(R, X.T)
+    return R
+
+
+def _signals(record: Record, z: Complex) -> Iterator[Array]:
+    """Blocks of Re x, Im x, u, Re and Im of the free responses, and y, shape (n_signals, n_block).
+
+    The free responses are left out of a record that begins at rest.
+    """
     from scipy.signal import lfilter  # slow to load, and only this fit needs it
 
-    n_outputs, n_inputs = system.D.shape
-    size = rms(recording)[n_inputs:]
-    scale = 1 / np.where(size > 0, size, 1)
-    n_fixed = _n_columns(system, z)
-    n_records = len(recording.records)
-    for number, record in enumerate(recording.records):
-        state = np.zeros((z.size, n_inputs), dtype=complex)
-        start = 0
-        for u, y in record.blocks(max(1, BLOCK // n_outputs)):
-            n = u.shape[1]
-            x = np.empty((z.size, n_inputs, n), dtype=complex)
-            for r, pole in enumerate(z):
-                delayed, last = lfilter([0, 1], [1, -pole], u, zi=state[r][:, None])
-                x[r], state[r] = delayed, last[:, 0]
-            rows = np.zeros((n_outputs, n, n_fixed + 2 * z.size * n_records + 1))
-            gx = np.einsum("or,rjk->okrj", shapes, x).reshape(n_outputs, n, -1)
-            rows[:, :, : gx.shape[2]] = gx.real
-            rows[:, :, gx.shape[2] : 2 * gx.shape[2]] = -gx.imag
-            for o in range(n_outputs):
-                first = 2 * gx.shape[2] + o * n_inputs
-                rows[o, :, first : first + n_inputs] = u.T
-            if record.kind not in FROM_REST:
-                free = np.einsum("or,rk->okr", shapes, z[:, None] ** (start + np.arange(n)))
-                first = n_fixed + 2 * z.size * number
-                rows[:, :, first : first + z.size] = free.real
-                rows[:, :, first + z.size : first + 2 * z.size] = -free.imag
-            rows[:, :, -1] = y
-            start += n
-            yield (rows * scale[:, None, None]).reshape(n_outputs * n, -1)
+    state = np.zeros((z.size, record.inputs.shape[0]), dtype=complex)
+    powers, start = z[:, None] ** np.arange(min(BLOCK, record.n_samples)), 0
+    for u, y in record.blocks(BLOCK):
+        n = u.shape[1]
+        x = np.empty((z.size, len(u), n), dtype=complex)
+        for r, pole in enumerate(z):
+            delayed, last = lfilter([0, 1], [1, -pole], u, zi=state[r][:, None])
+            x[r], state[r] = delayed, last[:, 0]
+        forced = x.reshape(-1, n)
+        free = z[:, None] ** start * powers[:, :n]
+        released = [] if record.kind in FROM_REST else [free.real, free.imag]
+        yield np.vstack([forced.real, forced.imag, u, *released, y])
+        start += n

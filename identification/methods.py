@@ -12,7 +12,8 @@ from identification.fdd import efdd
 from identification.frequency_domain import plscf_recording
 from identification.markov_methods import MARKOV_METHODS, around_the_order, realize_pulses
 from identification.next_era import next_era
-from identification.okid import okid_era
+from identification.observer import observe
+from identification.okid import realize, with_fitted_inputs
 from identification.recording import Recording
 from identification.ssi import ssi_cov
 from identification.ssi_data import ssi_data
@@ -104,11 +105,12 @@ def okid_era_recording(
 
     Source: Juang, Phan, Horta and Longman (1993), J. Guidance 16(2), 320-329.
     """
+    found = observe(recording, observer=observer)
 
-    def realize(order: int | None, orders: Iterable[int] | None) -> Realization:
-        return okid_era(recording, order, observer=observer, n_lags=n_lags, form=form, orders=orders)
+    def models(order: int | None, orders: Iterable[int] | None) -> Realization:
+        return realize(found, recording, order, n_lags=n_lags, form=form, orders=orders)
 
-    return around_the_order(realize, order, orders)
+    return with_fitted_inputs(around_the_order(models, order, orders), recording)
 
 
 def _on_pulses(name: str, summary: str) -> Method:

@@ -8,8 +8,17 @@ import numpy as np
 from numpy.typing import NDArray
 
 from identification.errors import IdentificationError, RecordingError, TooShortError
+from identification.lagged_products import lagged_products
 from identification.recording import Array, Recording
-from identification.regression import BLOCK, FROM_REST, least_squares, rms, triangular
+from identification.regression import (
+    BLOCK,
+    FROM_REST,
+    LONG,
+    factor_of_products,
+    least_squares,
+    rms,
+    triangular,
+)
 
 MOST_COLUMNS = 600
 """Columns of the regression at the longest observer tried, for the sake of time."""
@@ -160,7 +169,10 @@ def _n_rows(recording: Recording, p: int) -> int:
 
 
 def _factor(recording: Recording, scale: Array, p: int) -> tuple[Array, int]:
-    """Triangular factor of the rows [u(k), v(k - 1), …, v(k - p), y(k)], v = (u, y), and their number."""
+    """Triangular factor of the rows [u(k), v(k - 1), …, v(k - p), y(k)], v = (u, y), and their number.
+
+    Long records are factored through their products, unless rounding would tell beside the noise.
+    """
     n_inputs, width = len(recording.inputs), scale.size
     n_columns = n_inputs + p * width
     n_rows = _n_rows(recording, p)
@@ -169,6 +181,12 @@ def _factor(recording: Recording, scale: Array, p: int) -> tuple[Array, int]:
             f"an observer of length {p} has {n_columns} coefficients per output for {n_rows} samples; "
             "shorten it or lengthen the record"
         )
+    if n_rows > LONG:
+        products = lagged_products(recording, scale, p)
+        order = np.r_[:n_inputs, width : len(products), n_inputs:width]
+        factor = factor_of_products(products[np.ix_(order, order)], n_rows)
+        if factor is not None:
+            return factor, n_rows
     R = np.zeros((0, n_columns + width - n_inputs))
     for record in recording.records:
         past = np.zeros((width, p))

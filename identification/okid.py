@@ -76,7 +76,7 @@ def okid_era(
     """
     found = observe(recording, observer=observer)
     raw = realize(found, recording, order, n_lags=n_lags, form=form, orders=orders)
-    return _with_fitted_inputs(raw, recording)
+    return with_fitted_inputs(raw, recording)
 
 
 def realize(
@@ -130,8 +130,18 @@ def _unscaled(system: StateSpace, found: Observer) -> StateSpace:
     )
 
 
-def _with_fitted_inputs(realized: Realization, recording: Recording) -> Realization:
-    """The realization with B and D of the chosen order fitted to the recording."""
+def with_fitted_inputs(realized: Realization, recording: Recording) -> Realization:
+    """The realization with B and D of the chosen order fitted to the recording, unless that order has an unstable pole.
+
+    Args:
+        realized: by `realize`.
+        recording: what it was realized from.
+
+    Returns:
+        The other orders as they are.
+
+    Source: Ljung (1999), System Identification, 2nd ed., section 10.6: with A and C known, the outputs are linear in B and D.
+    """
     longest = max(record.n_samples for record in recording.records)
     radius = np.max(np.abs(np.linalg.eigvals(realized.system.A)))
     if longest * np.log(radius) > 3:

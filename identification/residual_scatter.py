@@ -85,13 +85,15 @@ def residual_scatter(
             f"{n_values} samples tell nothing of the noise beyond {n_unknowns} unknowns; record for longer"
         )
     scale = 1 / np.sqrt(1 - n_unknowns / n_values)  # what the fit has absorbed is given back
+    clean = [
+        np.asarray(record.outputs[:, :], dtype=float) - e
+        for record, e in zip(recording.records, residuals, strict=True)
+    ]
     draws = []
     for _ in work.each(range(DRAWS)):
         records = tuple(
-            replace(
-                record, outputs=np.asarray(record.outputs[:, :], dtype=float) - e + scale * redrawn(e, rng)
-            )
-            for record, e in zip(recording.records, residuals, strict=True)
+            replace(record, outputs=y + scale * redrawn(e, rng))
+            for record, y, e in zip(recording.records, clean, residuals, strict=True)
         )
         draws.append(estimate(replace(recording, records=records)))
     return scatter_of(np.array(draws), truth)
