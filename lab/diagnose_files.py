@@ -75,10 +75,6 @@ def diagnose_file(
         recording = _named(path, names)
         rig = matched(load_model(model), recording)
         known = None if baseline is None else same_channels(_named(baseline, names), recording)
-        if 0 in (widths or {}).values() and not isinstance(recording, FrequencyResponse):
-            raise LabError(
-                "a width of zero is taken with frequency responses only; give a small width, such as 0.0001"
-            )
         engine: Any = diagnose_spectra if isinstance(recording, FrequencyResponse) else diagnose
         diagnosis = engine(
             recording,

@@ -77,6 +77,10 @@ def diagnose(
     rig = nominal = _connected(rig, recording)
     model = twin(rig)
     parameters = parameters_of(model, widths)
+    if np.any(parameters.widths <= 0):
+        raise LabError(
+            "a width of zero is taken with frequency responses only; give a small width, such as 0.0001"
+        )
     known = None
     if baseline is not None:
         before = before.called("calibrating on the baseline")
@@ -210,8 +214,7 @@ def _settled(state: State, better: Fit, rig: Rig) -> State:
 
 def _restarted(state: State) -> State:
     """The state with a better fit, if there is one from the model's own parameters."""
-    found = restarted(state.misfit, state.fit)
-    return replace(state, fit=found, calibration=replace(state.calibration, fit=found, guided=found))
+    return _refitted(state, restarted(state.misfit, state.fit), state.accepted)
 
 
 def _renamed(state: State, effects: Mapping[str, type[Effect]]) -> State:
@@ -224,8 +227,14 @@ def _renamed(state: State, effects: Mapping[str, type[Effect]]) -> State:
         found = renamed(state.misfit, found, number, effects)
         cause = found.causes[number]
         accepted[position] = replace(accepted[position], cause=cause.kind.cause, location=cause.location)
+    return _refitted(state, found, tuple(accepted))
+
+
+def _refitted(state: State, found: Fit, accepted: tuple[Candidate, ...]) -> State:
+    """The state with another fit of as many causes."""
     calibration = replace(state.calibration, fit=found, guided=found)
-    return replace(state, fit=found, accepted=tuple(accepted), calibration=calibration)
+    held_out = (*state.held_out[:-1], held_out_error(state.misfit, found))
+    return State(calibration, found, accepted, state.origin, held_out)
 
 
 def _finely(state: State) -> State:

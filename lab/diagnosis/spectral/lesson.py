@@ -51,7 +51,9 @@ class Lesson:
         power = _power(likelihood, predicted)
         n = 2 * len(likelihood.values) / self.colour
         limit = scipy.stats.f.isf(LEVEL / power.size, n, 2 * self.lines)
-        ratio = power / self.power
+        # Where neither errs, neither errs more.
+        ratio = np.where(power > 0, np.inf, 1.0)
+        np.divide(power, self.power, out=ratio, where=self.power > 0)
         output, column = np.unravel_index(np.argmax(ratio), ratio.shape)
         worst = float(ratio[output, column])
         return (np.sqrt(worst), (int(output), int(column))) if worst > limit else None

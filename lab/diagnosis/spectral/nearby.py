@@ -79,13 +79,8 @@ class Nearby:
         # Channels multiply, so that what they do to ones they do to all.
         self._channels = behind_channels(plant, np.ones(self._bare.shape, dtype=complex), s)
 
-    @property
-    def response(self) -> Complex:
-        """Of the plant as it stands, (n_s, n_outputs, n_inputs + n_tones)."""
-        return self._behind(self._bare)
-
     def slope(self, j: int) -> Complex:
-        """Derivative of the response by a factor on share j, at 1."""
+        """Derivative of the response by a factor on share j, which adds a part of its nominal size."""
         left, right, share = self._sides(j)
         D = share.weights * (self._s**share.power)[:, None]
         if D.shape[1] == 1:
@@ -93,7 +88,7 @@ class Nearby:
         return self._behind(-left @ (D[:, :, None] * right))
 
     def with_factors(self, j: int, factors: Array) -> Iterator[Complex]:
-        """Responses with share j multiplied by each of some factors."""
+        """Responses with share j multiplied by each of some factors: factor - 1 of its nominal size is added."""
         left, right, share = self._sides(j)
         U = self._columns[j]
         G = self._receptance.between(U.T, U)  # (n_s, rank, rank)

@@ -173,8 +173,9 @@ class _Continuous:
             yield from (self._likelihood.unscaled(theta, self._causes) for theta in thetas)
             return
         (j,) = members
-        relative = np.array([self._factors(theta)[j] for theta in thetas]) / self._factors(self._theta)[j]
-        yield from (H[:, :, : self._inputs] for H in self._nearby.with_factors(j, relative))
+        # Shares have their nominal size: what a factor adds to it counts from 1.
+        added = np.array([self._factors(theta)[j] for theta in thetas]) - self._factors(self._theta)[j]
+        yield from (H[:, :, : self._inputs] for H in self._nearby.with_factors(j, 1 + added))
 
     def _factors(self, theta: Array) -> Array:
         return np.concatenate(self._likelihood.parameters.factors(theta))
