@@ -31,12 +31,21 @@ def with_best_inputs(markov: MarkovParameters, system: StateSpace) -> StateSpace
     Returns:
         The same poles and shapes.
 
+    Raises:
+        IdentificationError: the model grows so fast that its responses overflow.
+
     Source: Ljung (1999), System Identification, 2nd ed., section 10.6: with A and C known, the responses are linear in B.
     """
     seen = np.empty((markov.n_lags - 1, *system.C.shape))  # C Aᵏ
     rows = system.C
-    for k in range(len(seen)):
-        seen[k], rows = rows, rows @ system.A
+    with np.errstate(over="ignore", invalid="ignore"):
+        for k in range(len(seen)):
+            seen[k], rows = rows, rows @ system.A
+    if not np.all(np.isfinite(seen)):
+        raise IdentificationError(
+            f"the model of order {system.n_states} grows beyond all bounds within {len(seen)} lags; expected poles inside the "
+            "unit circle; try another order"
+        )
     Y = markov.values[1:].reshape(-1, len(markov.inputs))
     B = np.linalg.lstsq(seen.reshape(-1, system.n_states), Y)[0]
     return replace(system, B=np.asarray(B, dtype=float))

@@ -9,6 +9,7 @@ import pytest
 
 from benchmarks.error_bars import Case, calibrate
 from identification.era import era_dc
+from identification.errors import IdentificationError
 from identification.identify import identify
 from identification.markov_methods import MARKOV_METHODS
 from identification.markov_scatter import markov_scatter, with_best_inputs
@@ -27,6 +28,15 @@ def pulses(level, seed):
 
 def test_all_of_them_are_methods_of_a_recording():
     assert MARKOV_METHODS.keys() <= METHODS.keys()
+
+
+def test_a_model_that_grows_beyond_all_bounds_is_refused():
+    markov = markov_parameters(pulses(0.01, 0))
+    many = replace(markov, values=np.tile(markov.values, (60, 1, 1)))
+    system = era_dc(markov, order=6).system
+    growing = replace(system, A=1.2 * np.eye(system.n_states))
+    with pytest.raises(IdentificationError, match="grows beyond all bounds within"):
+        with_best_inputs(many, growing)
 
 
 @pytest.mark.parametrize("name", ["itd", "mrtd", "mmrtd"])
