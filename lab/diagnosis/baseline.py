@@ -12,10 +12,12 @@ from identification.recording import Array
 from lab.diagnosis.calibrate import Calibration
 from lab.diagnosis.colour import colour
 from lab.diagnosis.fit import Fit, fit
-from lab.diagnosis.misfit import Misfit
+from lab.diagnosis.misfit import Hypothesis, Misfit
 
 LEVEL = 1e-3
 """Probability that as little as a baseline leaves is taken for more."""
+SHARED = 0.5
+"""Share of what a cause explains per sample that it must explain of the baseline to have been there before."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -23,6 +25,7 @@ class Baseline:
     """A model calibrated on a known state, and what that leaves.
 
     Attributes:
+        misfit: model and data of the known state.
         fit: parameters with error bars that know how alike the errors are.
         power: residual over signal power of every output.
         colour: samples of the residual that count as one.
@@ -30,6 +33,7 @@ class Baseline:
         gains: relative standard deviation of the gain of each input that is not known exactly, by name of the input.
     """
 
+    misfit: Misfit
     fit: Fit
     power: Array
     colour: float
@@ -48,7 +52,7 @@ class Baseline:
             parameters.names[i].partition(" ")[2]: float(parameters.widths[i] * stds[i])
             for i in range(parameters.n_structural, parameters.n_factors)
         }
-        return cls(found, _power(coloured, found), alike, residual.shape[1] / alike, gains)
+        return cls(coloured, found, _power(coloured, found), alike, residual.shape[1] / alike, gains)
 
     def covers(self, misfit: Misfit, found: Fit) -> bool:
         """Whether a fit of another recording leaves no more of its signals than the baseline of its own.
@@ -59,6 +63,17 @@ class Baseline:
         samples = max(found.residual.shape[1] / self.colour, 1.0)
         limit = scipy.stats.f.isf(LEVEL / power.size, samples, max(self.samples, 1.0))
         return bool(np.all(power <= limit * self.power))
+
+    def shows(self, cause: Hypothesis, gain: float, samples: float) -> bool:
+        """Whether a cause was there before: it explains at least half as much of the baseline, sample by sample.
+
+        Args:
+            cause: as fitted to another recording.
+            gain: 2 log evidence that it gains there.
+            samples: of that recording, counted as those of the baseline.
+        """
+        before = fit(self.misfit, self.fit.theta, (cause,), iterations=8)
+        return bool((self.fit.objective - before.objective) / self.samples >= SHARED * gain / samples)
 
 
 def _power(misfit: Misfit, found: Fit) -> Array:

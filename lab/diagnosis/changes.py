@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
 
@@ -24,10 +25,18 @@ DAMPING_FACTORS = np.geomspace(1 / 16, 16, 16)
 SPRING_FACTORS = np.geomspace(0.03, 3, 14)
 """Stiffness of a missing spring over what its place has already."""
 WINDOW = 1024
-"""Samples of every record on which factors are tried."""
+"""Samples of every record on which factors are tried; so many times more where several count as one."""
 WORTH = 20.0
 """-2 log posterior that a trial value must gain to be followed."""
 FOLLOWED = 4
+FAR = 4.0
+"""Widths beyond which a parameter may have gone to make up for a cause, which then shows better from the model as given."""
+
+
+def starts(misfit: Misfit, theta: Array) -> list[Array]:
+    """The parameters, and beside them the nominal ones where they have gone far to make up for a cause."""
+    nominal = misfit.parameters.nominal(theta)
+    return [theta, nominal] if np.max(np.abs(theta - nominal)) > FAR else [theta]
 
 
 def directions(misfit: Misfit, effects: Mapping[str, type[Effect]]) -> Iterator[tuple[str, str, Array]]:
@@ -54,10 +63,12 @@ def large_changes(
     seen = _windowed(misfit)
     reference = _level(seen, present, present.theta, present.causes)
     trying, following = work.parts(2.0, 1.0)
-    for cause, location, direction in trying.each(list(directions(misfit, effects))):
+    for (cause, location, direction), start in trying.each(
+        list(itertools.product(directions(misfit, effects), starts(misfit, present.theta)))
+    ):
         lifted = replace(seen, parameters=misfit.parameters.lifted(direction))
         for factor in DAMPING_FACTORS if cause == "damping_change" else FACTORS:
-            theta = present.theta + np.log(factor) * direction / misfit.parameters.widths
+            theta = start + np.log(factor) * direction / misfit.parameters.widths
             theta = _restarted(seen, theta)
             tried.append((_level(lifted, present, theta, present.causes), cause, location, direction, theta))
     best: dict[tuple[str, str], tuple[float, str, str, Array, Array]] = {}
@@ -101,7 +112,8 @@ def stiff_springs(
 
 def _windowed(misfit: Misfit) -> Misfit:
     """The misfit on the beginning of every record."""
-    return replace(misfit, n_train=tuple(min(n, WINDOW) for n in misfit.n_train))
+    most = int(WINDOW * misfit.colour)
+    return replace(misfit, n_train=tuple(min(n, most) for n in misfit.n_train))
 
 
 def _level(misfit: Misfit, present: Fit, theta: Array, causes: Sequence[Hypothesis]) -> float:

@@ -35,6 +35,8 @@ from lab.twin import twin
 MOST_FINDINGS = 4
 UNSETTLED = 30.0
 """-2 log posterior by which a fit must fall to be taken for one that had not converged."""
+RUNS_AWAY = 2.0
+"""Error over signal that no bounded motion reaches, however little it has to do with the measured one."""
 LAW_SUBSTEPS = 12
 """Substeps where the model has a law or one was found, so that its numerics are not taken for another cause."""
 FINE_SUBSTEPS = 24
@@ -113,6 +115,7 @@ def diagnose(
             if better.objective < state.fit.objective - UNSETTLED:
                 state, fine = _settled(state, better, rig), None
                 candidates, threshold = search(state.calibration, state.fit, effects)
+        candidates = _credible(candidates, threshold, state, known)
         first = first or candidates
         if not candidates or candidates[0].gain < threshold:
             break
@@ -178,6 +181,25 @@ def _tightened(parameters: Parameters, known: Fit) -> Parameters:
     spread = np.sqrt(np.diag(np.linalg.pinv(precision[np.ix_(others, others)], rcond=1e-14, hermitian=True)))
     widths = np.maximum(parameters.widths[:n] * np.minimum(spread[:n], 1.0), 1e-3)
     return replace(parameters, names=parameters.names[:n], widths=widths, precision=np.eye(n), inputs=())
+
+
+def _credible(
+    candidates: list[Candidate], threshold: float, state: State, known: Baseline | None
+) -> list[Candidate]:
+    """The candidates from the first on that may be named.
+
+    None is under which the structure would move far more than it did, on data kept aside; nor what the baseline shows as well,
+    since what was there before has not changed.
+    """
+    for i, candidate in enumerate(candidates):
+        if candidate.gain < threshold or candidate.direction is not None:
+            return candidates[i:]
+        error = held_out_error(state.misfit, candidate.fit)
+        samples = candidate.fit.residual.shape[1] / state.misfit.colour
+        runs_away = error > RUNS_AWAY * max(1.0, state.held_out[-1])
+        if not (runs_away or (known and known.shows(candidate.fit.causes[-1], candidate.gain, samples))):
+            return candidates[i:]
+    return []
 
 
 def _with(state: State, candidate: Candidate, rig: Rig) -> State:

@@ -12,7 +12,7 @@ from identification.recording import Array
 from lab.diagnosis.calibrate import Calibration
 from lab.diagnosis.candidate import Candidate, last_of
 from lab.diagnosis.chance import quantile
-from lab.diagnosis.changes import OWN_CHANGES, large_changes, stiff_springs
+from lab.diagnosis.changes import OWN_CHANGES, large_changes, starts, stiff_springs
 from lab.diagnosis.evidence import minus_two_log_evidence
 from lab.diagnosis.fit import Fit, fit, theta_slopes
 from lab.diagnosis.misfit import Hypothesis, Misfit
@@ -27,8 +27,6 @@ REFITTED, PER_CAUSE, POLISHED = 10, 2, 3
 KEPT = 5
 """Candidates kept after each stage of their refits, besides those that are as good within `CLOSE`."""
 CLOSE = 30.0
-FAR = 4.0
-"""Widths beyond which a parameter may have gone to make up for a cause, which then shows better from the model as given."""
 COSTS = 26.0, 18.0, 3.0, 1.0, 3.0, 1.0
 """Of screening, refits, polish, the model's own parameters, large changes and stiff springs, as measured."""
 NEGLIGIBLE = 1e-3
@@ -60,13 +58,11 @@ def search(
     proposed = [
         h for h in proposed if not mends(h.kind, h.location, found, survey) and not echoes(h, causes, survey)
     ]
-    nominal = misfit.parameters.nominal(theta)
-    if np.max(np.abs(theta - nominal)) <= FAR:
-        screened = screen(misfit, theta, causes, observer, proposed, screening)
-    else:
-        # What moves parameters that far shows in half the samples, too.
-        near, far = screening.parts(1.0, 1.0)
-        screened = screen(misfit, theta, causes, observer, proposed, near, share=0.5)
+    first, *others = starts(misfit, theta)
+    near, far = screening.parts(1.0, 1.0 if others else 0.0)
+    # What moves parameters far shows in half the samples, too.
+    screened = screen(misfit, first, causes, observer, proposed, near, share=0.5 if others else 1.0)
+    for nominal in others:
         observer = kalman_gain(misfit, nominal, calibration.share) if observer.size else observer
         screened = screened.beside(screen(misfit, nominal, causes, observer, proposed, far, share=0.5))
     without = minus_two_log_evidence(present)

@@ -50,6 +50,13 @@ def test_the_same_state_is_consistent_with_a_baseline_that_the_model_does_not_ex
     assert any("errs in the baseline too" in warning for warning in found.warnings)
 
 
+@pytest.mark.slow
+def test_what_the_baseline_shows_as_well_is_no_change():
+    real = rubbing(cart())
+    found = lab.diagnose(recorded(real, 2), cart(), baseline=recorded(real, 1))
+    assert (found.verdict, found.findings) == ("consistent", ())
+
+
 def test_a_large_change_is_found_through_the_errors_of_the_model():
     real = rubbing(cart())
     heavier = EFFECTS["mass_change"](real.bodies[0], delta_mass=1.0).apply(real)
