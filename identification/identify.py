@@ -117,7 +117,7 @@ def identify(
         stable = (True,) * len(modes)
         realization, note = _lowest_complete(realization, stabilization)
         notes += note
-    barring = barring.called("refining" if refine else "finding error bars")
+    barring = barring.called("refining" if refine else "finding error bars" if uncertainty else "finishing")
     found = Found(recording, realization, stabilization, modes, places, settings)
     matrices, verdict = matrices_of(found, dofs, uncertainty=uncertainty)
     refined, after, doubts = _refined(found, matrices) if refine else (None, (), ())

@@ -9,17 +9,26 @@ import numpy as np
 
 from identification.progress import Progress, Work
 from identification.recording import Recording
+from lab.diagnosis.advance import (
+    LAW_SUBSTEPS,
+    finely,
+    tried_again,
+    with_better,
+    with_better_names,
+    with_cause,
+    without_idle,
+)
 from lab.diagnosis.baseline import Baseline
-from lab.diagnosis.calibrate import Calibration, calibrate, parameters_of, survey_of
+from lab.diagnosis.calibrate import calibrate, parameters_of
 from lab.diagnosis.candidate import Candidate
 from lab.diagnosis.changes import OWN_CHANGES
 from lab.diagnosis.conclude import calibrated_rig, conclude
 from lab.diagnosis.evidence import minus_two_log_evidence
-from lab.diagnosis.fit import Fit, fit
+from lab.diagnosis.fit import Fit
 from lab.diagnosis.gain import held_out_error
 from lab.diagnosis.misfit import Misfit, Parameters
 from lab.diagnosis.outcome import Diagnosis
-from lab.diagnosis.revise import renamed, restarted, settled
+from lab.diagnosis.revise import settled
 from lab.diagnosis.search import search
 from lab.diagnosis.starts import free_decays, with_starts
 from lab.diagnosis.state import State
@@ -37,10 +46,6 @@ UNSETTLED = 30.0
 """-2 log posterior by which a fit must fall to be taken for one that had not converged."""
 RUNS_AWAY = 2.0
 """Error over signal that no bounded motion reaches, however little it has to do with the measured one."""
-LAW_SUBSTEPS = 12
-"""Substeps where the model has a law or one was found, so that its numerics are not taken for another cause."""
-FINE_SUBSTEPS = 24
-"""Substeps of the last fits, where the numerics must not be mistaken for physics."""
 COSTS = 2.0, 9.0, 2.0, 4.0
 """Of calibration, search, refits with what was found, and conclusions, as measured."""
 
@@ -76,27 +81,8 @@ def diagnose(
         )
     before, whole = Work(progress).parts(0.0 if baseline is None else COSTS[0], sum(COSTS))
     calibrating, searching, accepting, concluding = whole.parts(*COSTS)
-    rig = nominal = _connected(rig, recording)
-    model = twin(rig)
-    parameters = parameters_of(model, widths)
-    if np.any(parameters.widths <= 0):
-        raise LabError(
-            "a width of zero is taken with frequency responses only; give a small width, such as 0.0001"
-        )
-    known = None
-    if baseline is not None:
-        before = before.called("calibrating on the baseline")
-        known_state = _like(baseline, recording)
-        base = Misfit.of(known_state, model, parameters, share=1.0)
-        base = with_starts(base, free_decays(known_state))
-        known = Baseline.of(calibrate(base, rig, before))
-        # What the baseline taught becomes the model, and what it left open the prior.
-        rig = calibrated_rig(base, known.fit.theta, rig)
-        model, parameters = twin(rig), _tightened(parameters, known.fit)
-    misfit = with_starts(Misfit.of(recording, model, parameters), free_decays(recording))
-    misfit = replace(misfit, colour=known.colour if known else 1.0)
-    if model.plant.laws:
-        misfit = replace(misfit, substeps=LAW_SUBSTEPS)
+    nominal = _connected(rig, recording)
+    rig, misfit, known = _begun(recording, nominal, baseline, widths or {}, before)
     calibration = calibrate(misfit, rig, calibrating.called("calibrating"))
     found = calibration.fit
     state = State(calibration, found, (), found, (held_out_error(calibration.misfit, found),))
@@ -113,7 +99,7 @@ def diagnose(
         if candidates:
             better = settled(state.misfit, state.fit, candidates[0].fit)
             if better.objective < state.fit.objective - UNSETTLED:
-                state, fine = _settled(state, better, rig), None
+                state, fine = with_better(state, better, rig), None
                 candidates, threshold = search(state.calibration, state.fit, effects)
         candidates = _credible(candidates, threshold, state, known)
         first = first or candidates
@@ -123,24 +109,48 @@ def diagnose(
             refused = candidates[0]
             break
         accepting.called("fitting what was found")
-        further = _with(state, candidates[0], rig)
-        finely = _finely(further)
-        covered = known is not None and known.covers(finely.misfit, finely.fit)
-        after = whiteness(finely.fit.residual, inputs)
+        further = with_cause(state, candidates[0], rig)
+        fitted = finely(further)
+        covered = known is not None and known.covers(fitted.misfit, fitted.fit)
+        after = whiteness(fitted.fit.residual, inputs)
         if not after.white:
-            further = _renamed(_restarted(further), effects)
-            finely = _finely(further)
-            after = whiteness(finely.fit.residual, inputs)
+            further = with_better_names(tried_again(further), effects)
+            fitted = finely(further)
+            after = whiteness(fitted.fit.residual, inputs)
         if state.accepted and not covered and patches(left, after):
             break
-        state, left, fine = further, after, finely
+        state, left, fine = further, after, fitted
         if (left.passed or covered) and not any(c.gain > threshold for c in _still_wrong(state)):
             break
-    kept = _without_idle(state)
-    state = fine if fine is not None and kept is state else _finely(kept)
+    kept = without_idle(state)
+    state = fine if fine is not None and kept is state else finely(kept)
     left = whiteness(state.fit.residual, inputs)
     told = concluding.called("simulating what was found")
     return conclude(state, recording, nominal, rig, first, left, known, refused, told)
+
+
+def _begun(
+    recording: Recording, rig: Rig, baseline: Recording | None, widths: Mapping[str, float], work: Work
+) -> tuple[Rig, Misfit, Baseline | None]:
+    """What is to be calibrated, the rig or what a baseline makes of it; its misfit; and what the baseline taught."""
+    model, known = twin(rig), None
+    parameters = parameters_of(model, widths)
+    if np.any(parameters.widths <= 0):
+        raise LabError(
+            "a width of zero is taken with frequency responses only; give a small width, such as 0.0001"
+        )
+    if baseline is not None:
+        work = work.called("calibrating on the baseline")
+        known_state = _like(baseline, recording)
+        base = Misfit.of(known_state, model, parameters, share=1.0)
+        base = with_starts(base, free_decays(known_state))
+        known = Baseline.of(calibrate(base, rig, work))
+        # What the baseline taught becomes the model, and what it left open the prior.
+        rig = calibrated_rig(base, known.fit.theta, rig)
+        model, parameters = twin(rig), _tightened(parameters, known.fit)
+    misfit = with_starts(Misfit.of(recording, model, parameters), free_decays(recording))
+    substeps = LAW_SUBSTEPS if model.plant.laws else misfit.substeps
+    return rig, replace(misfit, colour=known.colour if known else 1.0, substeps=substeps), known
 
 
 def _connected(rig: Rig, recording: Recording) -> Rig:
@@ -202,99 +212,6 @@ def _credible(
     return []
 
 
-def _with(state: State, candidate: Candidate, rig: Rig) -> State:
-    """The state with one more cause accepted, everything refitted together."""
-    misfit, found = state.misfit, candidate.fit
-    if candidate.direction is not None:
-        misfit = replace(misfit, parameters=misfit.parameters.lifted(candidate.direction))
-    refit = fit(
-        misfit,
-        found.theta,
-        found.causes,
-        observer=found.observer,
-        iterations=15,
-        refresh=2,
-        tolerance=0.1,
-    )
-    misfit = replace(misfit, survey=survey_of(misfit, rig, refit.theta, refit.residual))
-    if misfit.plant(refit.theta, refit.causes).laws:
-        misfit = replace(misfit, substeps=LAW_SUBSTEPS)
-    calibration = Calibration(misfit, refit, refit, 0.0)
-    held_out = (*state.held_out, held_out_error(misfit, refit))
-    return State(calibration, refit, (*state.accepted, candidate), state.origin, held_out)
-
-
-def _settled(state: State, better: Fit, rig: Rig) -> State:
-    """The state with a better fit of the causes so far."""
-    misfit = state.misfit
-    misfit = replace(misfit, survey=survey_of(misfit, rig, better.theta, better.residual))
-    calibration = Calibration(misfit, better, better, 0.0)
-    held_out = (*state.held_out[:-1], held_out_error(misfit, better))
-    origin = state.origin if state.accepted else better
-    return State(calibration, better, state.accepted, origin, held_out)
-
-
-def _restarted(state: State) -> State:
-    """The state with a better fit, if there is one from the model's own parameters."""
-    return _refitted(state, restarted(state.misfit, state.fit), state.accepted)
-
-
-def _renamed(state: State, effects: Mapping[str, type[Effect]]) -> State:
-    """The state with causes that were named while others were missing exchanged for better ones at their places."""
-    if len(state.accepted) < 2:
-        return state
-    accepted, found = list(state.accepted), state.fit
-    positions = [i for i, candidate in enumerate(accepted) if candidate.direction is None]
-    for number, position in enumerate(positions):
-        found = renamed(state.misfit, found, number, effects)
-        cause = found.causes[number]
-        accepted[position] = replace(accepted[position], cause=cause.kind.cause, location=cause.location)
-    return _refitted(state, found, tuple(accepted))
-
-
-def _refitted(state: State, found: Fit, accepted: tuple[Candidate, ...]) -> State:
-    """The state with another fit of as many causes."""
-    calibration = replace(state.calibration, fit=found, guided=found)
-    held_out = (*state.held_out[:-1], held_out_error(state.misfit, found))
-    return State(calibration, found, accepted, state.origin, held_out)
-
-
-def _finely(state: State) -> State:
-    """The state refitted with substeps so fine that numerics are not mistaken for physics."""
-    if not any(state.misfit.plant(state.fit.theta, state.fit.causes).laws):
-        return state
-    misfit = replace(state.misfit, substeps=FINE_SUBSTEPS)
-    found = state.fit
-    refit = fit(misfit, found.theta, found.causes, observer=found.observer, iterations=3, tolerance=0.5)
-    return replace(state, fit=refit, calibration=replace(state.calibration, misfit=misfit))
-
-
 def _still_wrong(state: State) -> list[Candidate]:
     """Parameters of the model that are out of tolerance with the causes so far in it."""
     return wrong_parameters(state.misfit, state.fit, minus_two_log_evidence(state.fit), OWN_CHANGES)
-
-
-def _without_idle(state: State) -> State:
-    """The state without causes whose evidence is gone now that others were found."""
-    if len(state.accepted) < 2:
-        return state
-    with_all = minus_two_log_evidence(state.fit)
-    for number, candidate in enumerate(state.accepted):
-        if candidate.direction is not None:
-            continue
-        position = sum(c.direction is None for c in state.accepted[:number])
-        causes = tuple(c for i, c in enumerate(state.fit.causes) if i != position)
-        trial = fit(
-            state.misfit,
-            state.fit.theta,
-            causes,
-            observer=state.fit.observer,
-            iterations=10,
-            refresh=1,
-            tolerance=0.1,
-        )
-        if minus_two_log_evidence(trial) <= with_all:
-            kept = (*state.accepted[:number], *state.accepted[number + 1 :])
-            errors = (*state.held_out[: number + 1], *state.held_out[number + 2 :])
-            return _without_idle(replace(state, fit=trial, accepted=kept, held_out=errors))
-    return state
