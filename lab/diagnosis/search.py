@@ -24,6 +24,8 @@ from lab.diagnosis.tolerance import confirmed, wrong_parameters
 from lab.effects.effect import Effect
 
 REFITTED, PER_CAUSE, POLISHED = 10, 2, 3
+ROUGH = 4
+"""Iterations before candidates are compared: from a model badly off, each makes the residual a few times smaller."""
 KEPT = 5
 """Candidates kept after each stage of their refits, besides those that are as good within `CLOSE`."""
 CLOSE = 30.0
@@ -93,13 +95,13 @@ def search(
 
 
 def _picked(rows: Sequence[Screened]) -> list[Screened]:
-    """The best, at most so many, and of each cause at most so many places."""
+    """The best, at most so many, and of each cause at most so many places from each start."""
     picked: list[Screened] = []
-    places: set[tuple[str, str, str]] = set()
+    places: set[tuple[str, str, str, int]] = set()
     for row in rows:
         h = row.hypothesis
-        key = (h.kind.cause, h.location, str(h.guess.fixed))
-        others = (each.hypothesis for each in picked)
+        key = (h.kind.cause, h.location, str(h.guess.fixed), id(row.theta))
+        others = (each.hypothesis for each in picked if each.theta is row.theta)
         same = sum(other.kind is h.kind and other.guess.fixed == h.guess.fixed for other in others)
         if key not in places and same < PER_CAUSE and len(picked) < REFITTED and row.score > -30:
             picked.append(row)
@@ -137,7 +139,7 @@ def _refitted(
                 theta,
                 causes,
                 present.observer,
-                iterations=2,
+                iterations=ROUGH,
                 refresh=3,
                 tolerance=1,
                 slopes=slopes.get(id(theta)),
