@@ -5,6 +5,7 @@ The recordings are not part of the project; tests that need them skip where they
 
 import numpy as np
 import pytest
+import scipy.optimize
 
 import lab
 from benchmarks import real_rigs
@@ -45,6 +46,20 @@ def test_the_beam_alone_on_a_rigid_clamp_is_a_cantilever():
     beta = np.array([1.875104, 4.694091, 7.854757])
     exact = beta**2 * np.sqrt(2.491e11 * 4.75e-3**2 / 12 / 7850) / 0.39**2 / (2 * np.pi)
     np.testing.assert_allclose(found, exact, rtol=5e-3)
+
+
+def test_the_lattice_tower_bends_as_a_cantilever_in_both_directions():
+    """Nine lumps of 10 kg, 1 m apart, are a beam of 10 kg/m with half a lump more at its tip."""
+    found = lab.Rig.load(RIGS / "lumo_tower" / "tower.xml").second_order().modes().frequency_hz
+    np.testing.assert_allclose(found[0::2], found[1::2], rtol=1e-9)
+
+    # Euler and Bernoulli with a tip mass of the share mu: 1 + cos cosh + mu b (cos sinh - sin cosh) = 0.
+    def free_end(b, mu=0.5 / 9):
+        return 1 + np.cos(b) * np.cosh(b) + mu * b * (np.cos(b) * np.sinh(b) - np.sin(b) * np.cosh(b))
+
+    beta = np.array([scipy.optimize.brentq(free_end, a, a + 1) for a in (1.2, 3.8)]) / 9
+    # Lumps 1 m apart miss the curvature of the second mode by about (beta h)² / 24, 1 %.
+    np.testing.assert_allclose(found[[0, 2]], beta**2 * np.sqrt(2.032e6 / 10) / (2 * np.pi), rtol=0.01)
 
 
 def test_every_model_is_listed():

@@ -5,6 +5,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+import lab
 from lab.files.importing import read_foreign
 from lab.files.recipe import load_recipe
 
@@ -23,6 +24,19 @@ CASES = {
 }
 """Recipe: folders, recordings in them, an output, its column counted from 0, SI per number."""
 
+MODELS = {
+    "ecp_carts/free_release.toml": "ecp_carts/one_cart_detached.xml",
+    "ecp_carts/random_one_cart.toml": "ecp_carts/one_cart.xml",
+    "ecp_carts/pulses_steps_one_cart.toml": "ecp_carts/one_cart.xml",
+    "ecp_carts/random_two_carts.toml": "ecp_carts/two_carts.xml",
+    "ecp_carts/three_carts.toml": "ecp_carts/three_carts.xml",
+    "silverbox/snls80mv.toml": "silverbox/silverbox.xml",
+    "beam_masses/response.toml": "beam_masses/beam.xml",
+    "unison_tower/wn.toml": "unison_tower/tower.xml",
+    "lumo_tower/acceleration.toml": "lumo_tower/tower.xml",
+}
+"""Recipe: the model whose actuators and sensors its channels are."""
+
 needs_data = pytest.mark.skipif(not DATA.is_dir(), reason="the recordings are not part of the project")
 
 
@@ -32,6 +46,34 @@ def test_every_recipe_is_sound_and_listed(path):
     assert recipe.source
     listed = (RECIPES / "README.md").read_text("utf-8")
     assert f"{path.parent.name}/{path.name}" in listed or f"{path.parent.name}/*.toml" in listed
+
+
+@pytest.mark.parametrize("name", MODELS)
+def test_channels_of_a_recipe_are_actuators_and_sensors_of_its_model(name):
+    recipe, rig = load_recipe(RECIPES / name), lab.Rig.load(RECIPES / MODELS[name])
+    outputs = {channel.name: channel.dof for channel in rig.outputs}
+    assert {part.name for part in recipe.inputs} <= {channel.name for channel in rig.inputs}
+    assert {part.name for part in recipe.outputs} <= set(outputs)
+    # Slides one by one, so that each channel moves its own place in the viewer; the beam's pieces turn one another.
+    if name != "beam_masses/response.toml":
+        assert all(outputs[part.name] for part in recipe.outputs)
+
+
+@needs_data
+def test_the_lattice_tower_has_its_sensors_where_they_are_documented():
+    rig = lab.Rig.load(RECIPES / "lumo_tower/tower.xml")
+    recipe = load_recipe(RECIPES / "lumo_tower/acceleration.toml")
+    rows = np.loadtxt(
+        DATA / "lumo_tower/coords_lumo.csv", delimiter=",", skiprows=1, max_rows=18, usecols=range(6)
+    )
+    for part, (_, number, x, y, z, direction) in zip(recipe.outputs, rows, strict=True):
+        level, axis = part.name.split(".")
+        assert part.column == number
+        ring = rig.model.body(level.replace("level", "ring"))
+        np.testing.assert_array_equal(
+            ring.pos + rig.model.site(level.replace("level", "site")).pos, (x, y, z)
+        )
+        assert axis == "xy"[int(direction) - 1]
 
 
 @needs_data
