@@ -58,8 +58,9 @@ def test_the_lattice_tower_bends_as_a_cantilever_in_both_directions():
         return 1 + np.cos(b) * np.cosh(b) + mu * b * (np.cos(b) * np.sinh(b) - np.sin(b) * np.cosh(b))
 
     beta = np.array([scipy.optimize.brentq(free_end, a, a + 1) for a in (1.2, 3.8)]) / 9
-    # Lumps 1 m apart miss the curvature of the second mode by about (beta h)² / 24, 1 %.
-    np.testing.assert_allclose(found[[0, 2]], beta**2 * np.sqrt(2.032e6 / 10) / (2 * np.pi), rtol=0.01)
+    exact = beta**2 * np.sqrt(2.032e6 / 10) / (2 * np.pi)
+    # Lumps and hinges a distance h = 1 m apart err by (beta h)² / 12 within a wave, and about as much again at each end.
+    assert np.all(np.abs(found[[0, 2]] / exact - 1) < beta**2 / 4)
 
 
 def test_every_model_is_listed():
