@@ -5,7 +5,6 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-import scipy.optimize
 
 from identification.modes import Modes, mac
 from identification.systems import SecondOrder
@@ -70,11 +69,13 @@ def compare(
     Returns:
         The comparison; the distance of a pair is its relative frequency difference over `frequency_band` plus 1 - MAC.
     """
+    from scipy.optimize import linear_sum_assignment  # slow to load
+
     agreement = mac(truth.shapes, estimate.shapes)
     relative = np.subtract.outer(-truth.frequency_hz, -estimate.frequency_hz) / truth.frequency_hz[:, None]
     near = np.abs(relative) <= frequency_band
     cost = np.where(near, np.abs(relative) / frequency_band + (1 - agreement), 1e3)
-    rows, columns = scipy.optimize.linear_sum_assignment(cost)
+    rows, columns = linear_sum_assignment(cost)
     pairs = tuple(
         Pair(
             int(i),

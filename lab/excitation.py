@@ -7,8 +7,6 @@ from dataclasses import dataclass, field, fields
 from typing import ClassVar
 
 import numpy as np
-import scipy.integrate
-import scipy.signal
 
 from identification.recording import Array
 from lab.errors import LabError, UnknownNameError
@@ -85,8 +83,10 @@ class Sweep(Excitation):
             raise LabError(
                 f"a logarithmic sweep cannot start at {low} Hz; give a band that starts above zero"
             )
+        from scipy.signal import chirp  # slow to load, and only sweeps need it
+
         duration = sampling.n_samples / sampling.sample_rate
-        shape = scipy.signal.chirp(sampling.time, low, duration, high, method=self.law, phi=-90)
+        shape = chirp(sampling.time, low, duration, high, method=self.law, phi=-90)
         return _one_by_one(self.kind, rig, self.amplitude * shape)
 
 

@@ -9,7 +9,6 @@ import math
 from collections.abc import Callable
 
 import numpy as np
-import scipy.signal
 
 from identification.recording import Array
 
@@ -21,7 +20,9 @@ class _Recursion:
         self.growth, self.memory = growth, np.zeros(1, dtype=complex)
 
     def __call__(self, w: Array) -> Array:
-        z, self.memory = scipy.signal.lfilter([0.0, 1.0], [1.0, -self.growth], w, zi=self.memory)
+        from scipy.signal import lfilter  # slow to load, and only filtered signals need it
+
+        z, self.memory = lfilter([0.0, 1.0], [1.0, -self.growth], w, zi=self.memory)
         return np.asarray(z)
 
 
@@ -74,7 +75,9 @@ def held_low_pass(corner_hz: float, order: int, dt: float) -> Callable[[Array], 
 
 def _butterworth(corner_hz: float, order: int) -> tuple[np.ndarray, np.ndarray]:
     """Poles [rad/s] in the upper half plane and residues of the analog filter, doubled where the conjugate is left out."""
-    _, poles, gain = scipy.signal.butter(order, 2 * np.pi * corner_hz, analog=True, output="zpk")
+    from scipy.signal import butter  # slow to load, and only filtered signals need it
+
+    _, poles, gain = butter(order, 2 * np.pi * corner_hz, analog=True, output="zpk")
     apart = poles[:, None] - poles[None, :] + np.eye(order)
     residues = gain / np.prod(apart, axis=1)
     # A real pole comes with a rounded imaginary part, or none.

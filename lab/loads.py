@@ -8,8 +8,6 @@ from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 
 import numpy as np
-import scipy.integrate
-import scipy.signal
 
 from identification.recording import Array
 from lab.errors import LabError
@@ -82,6 +80,8 @@ class BandNoise:
 
     def blocks(self) -> Iterator[Array]:
         """Pieces of the record, shape (n_rows, at most `BLOCK`)."""
+        from scipy.signal import sosfilt  # slow to load, and only random forces need it
+
         rng = np.random.default_rng(self.seed)
         sections, scale = self._filter()
         memory = (
@@ -92,27 +92,29 @@ class BandNoise:
             # Drawn sample by sample across the rows, so that a shorter record is the start of a longer one.
             block = rng.standard_normal((n, self.n_rows)).T
             if sections is not None:
-                block, memory = scipy.signal.sosfilt(sections, block, axis=1, zi=memory)
+                block, memory = sosfilt(sections, block, axis=1, zi=memory)
             yield self.rms * scale * block
 
     def _filter(self) -> tuple[Array | None, float]:
         if self.band is None:
             return None, 1.0
+        from scipy.signal import butter  # slow to load, and only bands need it
+
         low, high = band_within(self.band, self.sampling)
         nyquist = self.sampling.sample_rate / 2
         if low <= 0 and high >= nyquist:
             return None, 1.0
         edges = [edge / nyquist for edge in (low, high) if 0 < edge < nyquist]
         kind = "bandpass" if len(edges) == 2 else "lowpass" if low <= 0 else "highpass"
-        sections = scipy.signal.butter(
-            FILTER_ORDER, edges if len(edges) == 2 else edges[0], kind, output="sos"
-        )
+        sections = butter(FILTER_ORDER, edges if len(edges) == 2 else edges[0], kind, output="sos")
         # White noise of unit variance leaves with the energy of the impulse response, by Parseval's theorem.
         return sections, 1 / math.sqrt(_energy(edges, kind))
 
 
 def _energy(edges: Sequence[float], kind: str) -> float:
     """Mean power gain of the digital Butterworth filter over all frequencies, as shares of half the sample rate."""
+    from scipy.integrate import quad  # slow to load, and only bands need it
+
     corners = [math.tan(math.pi * edge / 2) for edge in edges]
 
     def gain(share: float) -> float:
@@ -127,9 +129,7 @@ def _energy(edges: Sequence[float], kind: str) -> float:
     width = edges[1] - edges[0] if kind == "bandpass" else min(edges[0], 1 - edges[0])
     near = [edge + side * width * 4.0**k for edge in edges for side in (-1, 0, 1) for k in range(-1, 20)]
     points = [0.0, *sorted({point for point in near if 0 < point < 1}), 1.0]
-    return sum(
-        scipy.integrate.quad(gain, a, b, epsabs=0, epsrel=1e-10)[0] for a, b in itertools.pairwise(points)
-    )
+    return sum(quad(gain, a, b, epsabs=0, epsrel=1e-10)[0] for a, b in itertools.pairwise(points))
 
 
 def band_within(band: Sequence[float], sampling: Sampling) -> tuple[float, float]:

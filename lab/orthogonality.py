@@ -6,7 +6,6 @@ from dataclasses import dataclass
 
 import numpy as np
 import scipy.linalg
-import scipy.optimize
 from numpy.typing import NDArray
 
 from identification.recording import Array
@@ -52,10 +51,12 @@ def cross_orthogonality(result: Result) -> CrossOrthogonality | None:
     M = _reduced_mass(truth, rows)
     if M is None:
         return None
+    from scipy.optimize import linear_sum_assignment  # slow to load
+
     squares, normal = scipy.linalg.eigh(truth.stiffness, truth.mass)
     frequency_hz = np.sqrt(np.maximum(squares, 0)) / (2 * np.pi)
     wanted = result.truth_modes.frequency_hz[[pair.truth for pair in pairs]]
-    _, nearest = scipy.optimize.linear_sum_assignment(np.abs(wanted[:, None] - frequency_hz))
+    _, nearest = linear_sum_assignment(np.abs(wanted[:, None] - frequency_hz))
     model, test = normal[rows][:, nearest], shapes[rows][:, own].real
     model, test = (each / np.sqrt(np.einsum("ik,ij,jk->k", each, M, each)) for each in (model, test))
     dofs = tuple(truth.dofs[row] for row in rows)

@@ -6,7 +6,6 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-import scipy.signal
 
 from identification.recording import Array
 from lab.filters import band_limited_delay, band_limited_lag
@@ -63,7 +62,9 @@ def pushed(paths: Sequence[Path], inputs: Array, dt: float) -> list[Array]:
     for path, row in zip(paths, inputs, strict=True):
         if path.held_lag:
             share = -np.expm1(-dt / path.held_lag)
-            row = scipy.signal.lfilter([share], [1, share - 1], row)
+            from scipy.signal import lfilter  # slow to load, and only lagging actuators need it
+
+            row = lfilter([share], [1, share - 1], row)
         force = np.clip(path.gain * row, -path.limit, path.limit) if path != PLAIN else row
         whole, part = path.parts(dt)
         forces.append(_shifted(force, whole + (part > 0)))

@@ -10,7 +10,6 @@ from numbers import Real
 from typing import ClassVar
 
 import numpy as np
-import scipy.signal
 
 from identification.recording import Array
 from lab.errors import RigError
@@ -139,12 +138,14 @@ class HeldLag(Stage):
     time_constant: float
 
     def start(self, dt: float, rng: np.random.Generator, rms: float) -> Process:
+        from scipy.signal import lfilter  # slow to load, and only lags need it
+
         share = -np.expm1(-dt / self.time_constant)
         memory = np.zeros(1)
 
         def process(x: Array) -> Array:
             nonlocal memory
-            y, memory = scipy.signal.lfilter([share], [1, share - 1], x, zi=memory)
+            y, memory = lfilter([share], [1, share - 1], x, zi=memory)
             return np.asarray(y)
 
         return process

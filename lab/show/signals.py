@@ -10,7 +10,6 @@ from dataclasses import dataclass
 
 import numpy as np
 import scipy.fft
-import scipy.signal
 
 from identification.recording import Channel, Record, Recording
 
@@ -126,7 +125,7 @@ def spectra(recording: Recording, *, n_segment: int = 8192, n_averages: int = 12
         n = min(n_segment, shortest, max(256, 1 << int(np.log2(max(recording.n_samples / 4, 1)))))
     if n < 8:
         return None
-    window = np.ones(n) if whole else scipy.signal.windows.hann(n, sym=False)
+    window = np.ones(n) if whole else np.sin(np.pi * np.arange(n) / n) ** 2
     n_frequencies = n // 2 + 1
     outputs = np.zeros((len(recording.outputs), n_frequencies))
     inputs = np.zeros((n_frequencies, n_inputs, n_inputs), dtype=complex)
