@@ -122,11 +122,26 @@ def _product(A, x, out):  # type: ignore[no-untyped-def]
 
 
 @njit(cache=True, nogil=True, fastmath=REORDERED)
-def respond(F, G, P, Q, X, V, S, T, R, at, C, D, E, laws, params, u, x0, n_record, L, y):  # type: ignore[no-untyped-def]
+def _turned(turns, pushes, acting, out):  # type: ignore[no-untyped-def]
+    """Puts into out the states after a step, where each moves with its partner only, half of the states away."""
+    n, half = pushes.shape[1], pushes.shape[1] // 2
+    for j in range(half):
+        out[j] = turns[0, j] * acting[j] + turns[1, j] * acting[j + half]
+        out[j + half] = turns[0, j + half] * acting[j + half] + turns[1, j + half] * acting[j]
+    for i in range(pushes.shape[0]):
+        push = acting[n + i]
+        for j in range(n):
+            out[j] += pushes[i, j] * push
+
+
+@njit(cache=True, nogil=True, fastmath=REORDERED)
+def respond(F, turns, G, P, Q, X, V, S, T, R, at, C, D, E, laws, params, u, x0, n_record, L, y):  # type: ignore[no-untyped-def]
     """Outputs, shape (n_samples, n_outputs), of one record; NaN from where the motion diverges.
 
     Args:
-        F: state over one substep, (n_states, n_states).
+        F: state over one substep, (n_states, n_states), or no rows where states move in pairs.
+        turns: state over one substep where states move in pairs, (2, n_states): share of its own, and of its
+            partner's half of the states away.
         G: inputs held over a sample, in each of its substeps, (substeps, n_states, n_inputs).
         P, Q: forces of the laws that fall from one to zero and rise from zero to one over a substep, (n_states, n_laws);
             for dry friction, which jumps, zero and the force that is one all along.
@@ -141,15 +156,20 @@ def respond(F, G, P, Q, X, V, S, T, R, at, C, D, E, laws, params, u, x0, n_recor
         L: observer gain (n_states, n_outputs) that pulls the state to the measured `y`, or no rows.
         y: measured outputs, (n_samples, n_outputs), used with an observer only; NaN where missing.
     """
-    n, n_states, n_inputs, n_outputs, n_laws = u.shape[0], F.shape[0], u.shape[1], C.shape[0], laws.size
+    n, n_states, n_inputs, n_outputs, n_laws = u.shape[0], x0.size, u.shape[1], C.shape[0], laws.size
     # What acts: state, inputs, and forces of the laws.
     acting = np.concatenate((x0, np.zeros(n_inputs + n_laws)))
     x, g = acting[:n_states], acting[n_states + n_inputs :]
     readings, last_read = _stacked(C, D, E), np.max(at)
-    moves = np.zeros((G.shape[0], n_states + (-n_states) % 4, acting.size))
-    for step in range(G.shape[0]):
+    paired = F.shape[0] == 0
+    moves = np.zeros((0 if paired else G.shape[0], n_states + (-n_states) % 4, acting.size))
+    for step in range(moves.shape[0]):
         moves[step] = _stacked(F, G[step], P)
-    free, reading = np.zeros(moves.shape[1]), np.zeros(readings.shape[0])
+    pushes = np.zeros((G.shape[0] if paired else 0, n_inputs + n_laws, n_states))
+    for step in range(pushes.shape[0]):
+        pushes[step, :n_inputs], pushes[step, n_inputs:] = G[step].T, P.T
+    stuck_on = np.ascontiguousarray(Q.T)
+    free, reading = np.zeros(n_states + (-n_states) % 4), np.zeros(readings.shape[0])
     out, z = np.empty((n, n_outputs)), np.zeros(n_laws)
     # Extensions and their rates, at the start of a substep, without laws at its end, and per force of each law.
     xs, vs, xf, vf = np.zeros(n_laws), np.zeros(n_laws), np.zeros(n_laws), np.zeros(n_laws)
@@ -198,7 +218,10 @@ def respond(F, G, P, Q, X, V, S, T, R, at, C, D, E, laws, params, u, x0, n_recor
                 for i in range(n_outputs):
                     if at[i] == step:
                         out[k, i] = reading[i]
-            _product(moves[step], acting, free)
+            if paired:
+                _turned(turns, pushes[step], acting, free)
+            else:
+                _product(moves[step], acting, free)
             for e in range(n_laws):
                 a, b, c, d = 0.0, 0.0, 0.0, 0.0
                 for j in range(n_states):
@@ -248,14 +271,14 @@ def respond(F, G, P, Q, X, V, S, T, R, at, C, D, E, laws, params, u, x0, n_recor
             for e in range(n_laws):
                 if laws[e] == BOUC_WEN:
                     z[e] = g[e]
-            finite = True
+            for e in range(n_laws):
+                for j in range(n_states):
+                    free[j] += stuck_on[e, j] * g[e]
+            lost = 0
             for j in range(n_states):
-                value = free[j]
-                for e in range(n_laws):
-                    value += Q[j, e] * g[e]
-                x[j] = value
-                finite = finite and abs(value) < 1e100
-            if not finite:
+                x[j] = free[j]
+                lost += not abs(free[j]) < 1e100
+            if lost:
                 out[k + 1 :] = np.nan
                 for i in range(n_outputs):
                     if at[i] > step:

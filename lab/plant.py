@@ -8,16 +8,20 @@ reference; the tests hold one against the other.
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from functools import cached_property
 
 import numpy as np
 import scipy.linalg
 
 from identification.recording import Array, Channel
 from lab.forces import COULOMB
+from lab.pairs import Pairs, pairs_of
 from lab.paths import Path as Path
 from lab.paths import pushed, recorded, structural
 
 NO_OBSERVER = np.zeros((0, 0))
+WORTH_PAIRING = 4e6
+"""Products per response, of the transition with the state, beyond which finding pairs of states costs less than it saves."""
 
 Changes = dict[int, tuple[int, float]]
 """For each input column that acts after the force of a late actuator changes within a sample: the column that acts before,
@@ -145,9 +149,15 @@ class Responder:
         if not inputs.shape[0]:
             inputs = np.zeros((len(plant.inputs), n_samples))
         u = self._driven(inputs[:, :n_samples])
-        state = np.zeros(self.matrices[0].shape[0])
+        n_states = self.matrices[0].shape[0]
+        state = np.zeros(n_states)
         if initial is not None:
             state[: initial.size] = initial
+        matrices, products = self.matrices, n_samples * self.matrices[1].shape[0] * n_states**2
+        paired = self._pairs if products > WORTH_PAIRING else None
+        if paired is not None:
+            matrices, state = self._paired_matrices, paired.inverse @ state
+            observer = paired.inverse @ observer if observer.size else observer
         y = np.zeros((0, 0))
         if measured is not None and observer.size:
             y = np.ascontiguousarray(
@@ -155,7 +165,9 @@ class Responder:
             )
         with np.errstate(over="ignore", invalid="ignore"):
             out = kernel.respond(  # type: ignore[call-arg]
-                *self.matrices,
+                matrices[0],
+                NO_OBSERVER if paired is None else paired.turns,
+                *matrices[1:],
                 self.laws,
                 self.parameters,
                 u,
@@ -165,6 +177,19 @@ class Responder:
                 y,
             )
         return recorded(plant.output_paths, plant.order, np.ascontiguousarray(out.T), self.dt)
+
+    @cached_property
+    def _pairs(self) -> Pairs | None:
+        return pairs_of(self.matrices[0])
+
+    @cached_property
+    def _paired_matrices(self) -> tuple[Array, ...]:
+        """The matrices for states in pairs; no rows stand for the transition."""
+        _, G, P, Q, X, V, S, T, R, at, C, D, E = self.matrices
+        assert self._pairs is not None
+        shapes, inverse = self._pairs.shapes, self._pairs.inverse
+        matrices = (NO_OBSERVER, inverse @ G, inverse @ P, inverse @ Q, X @ shapes, V @ shapes, S @ shapes)
+        return (*matrices, T, R, at, C @ shapes, D, E)
 
     def _driven(self, inputs: Array) -> Array:
         """Inputs of the kernel, (n_samples, n_inputs): forces of the actuators, then of tones."""
