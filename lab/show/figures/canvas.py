@@ -12,9 +12,10 @@ from typing import Any
 import matplotlib
 import numpy as np
 from matplotlib.axes import Axes
+from matplotlib.backends.backend_svg import FigureCanvasSVG
 from matplotlib.figure import Figure
 from matplotlib.font_manager import findfont, get_font
-from matplotlib.ticker import FuncFormatter, MaxNLocator
+from matplotlib.ticker import FuncFormatter, MaxNLocator, NullFormatter
 
 WIDTH = 6.7
 """Of every figure [inch]: the text width of A4 with margins of 20 mm."""
@@ -67,7 +68,8 @@ def drawing(name: str, height: float, caption: str, paint: Callable[[Figure], No
         figure = Figure(figsize=(WIDTH, height), layout="constrained")
         paint(figure)
         text = io.StringIO()
-        figure.savefig(text, format="svg", metadata={"Date": None})
+        # `savefig` would draw everything once more beforehand, for the sake of the layout, which drawing brings about too.
+        FigureCanvasSVG(figure).print_svg(text, metadata={"Date": None})
     return Drawing(name, clean(text.getvalue(), name, caption), caption)
 
 
@@ -148,7 +150,7 @@ def logarithmic(axes: Axes) -> None:
     low, high = axes.get_ylim()
     axes.set_ylim(max(low, high * 1e-8), high)
     axes.yaxis.set_major_formatter(FuncFormatter(power_of_ten))
-    axes.yaxis.set_minor_formatter(FuncFormatter(lambda value, place: ""))
+    axes.yaxis.set_minor_formatter(NullFormatter())
 
 
 def decibel_axis(axes: Axes, label: str, *, factor: float) -> None:

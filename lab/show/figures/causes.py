@@ -4,10 +4,11 @@ from __future__ import annotations
 
 import numpy as np
 from matplotlib.figure import Figure
+from matplotlib.ticker import FuncFormatter, NullFormatter
 
 from lab.diagnosis.outcome import Diagnosis
 from lab.show.drawing import SERIES
-from lab.show.figures.canvas import Drawing, drawing, plain
+from lab.show.figures.canvas import Drawing, drawing, plain, power_of_ten
 from lab.show.findings import evidence, weighed_causes
 from lab.validation import COVERAGE
 
@@ -45,6 +46,8 @@ def causes_figure(diagnosis: Diagnosis) -> Drawing | None:
                 ha="left",
             )
         axes.set_xscale("log")
+        axes.xaxis.set_major_formatter(FuncFormatter(power_of_ten))
+        axes.xaxis.set_minor_formatter(NullFormatter())
         axes.set_xlim(0.5, 4 * float(length.max()))
         axes.axvline(DECISIVE, color="black", linestyle=":", linewidth=0.8)
         axes.set_yticks(rows, [plain(each.text, 48) for each in ranked])
