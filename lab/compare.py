@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
+from scipy.optimize import linear_sum_assignment
 
 from identification.modes import Modes, mac
 from identification.systems import SecondOrder
@@ -69,8 +70,6 @@ def compare(
     Returns:
         The comparison; the distance of a pair is its relative frequency difference over `frequency_band` plus 1 - MAC.
     """
-    from scipy.optimize import linear_sum_assignment  # slow to load
-
     agreement = mac(truth.shapes, estimate.shapes)
     relative = np.subtract.outer(-truth.frequency_hz, -estimate.frequency_hz) / truth.frequency_hz[:, None]
     near = np.abs(relative) <= frequency_band

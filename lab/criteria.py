@@ -3,9 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from typing import TYPE_CHECKING
 
-from lab.compare import Comparison
 from lab.result import Criterion
+
+if TYPE_CHECKING:
+    from lab.compare import Comparison
 
 AT_LEAST = ("modes", "mac", "effects_found", "verdict_right")
 """Criteria whose value must not fall below the limit; all others must not exceed it."""

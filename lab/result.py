@@ -3,12 +3,15 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 from identification.likelihood import Estimate
 from identification.modes import Modes
 from identification.stability import Stabilization
 from identification.systems import Realization, SecondOrder
-from lab.compare import Comparison
+
+if TYPE_CHECKING:
+    from lab.compare import Comparison
 
 
 @dataclass(frozen=True)
