@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+from contextlib import AbstractContextManager, nullcontext
 from functools import partial
 from pathlib import Path
 
 import click
 
+from lab.aside import Aside
 from lab.cli.completion import names_of
 from lab.cli.progress import Bar
 from lab.cli.shared import (
@@ -21,6 +23,9 @@ from lab.cli.shared import (
     print_outcome,
     typed,
 )
+
+ASIDE = 2**16, 2**28
+"""Sizes of recordings [bytes] whose report is drawn aside: diagnosed not before a second process is up, and quickly copied."""
 
 
 @click.command(
@@ -69,12 +74,13 @@ def command(
 
     MODEL.xml is a file, or a name from `lab list models`.
     """
-    from lab.diagnose_files import diagnose_file
-    from lab.diagnosis_summary import diagnosis_summary
-    from lab.files.diagnosis import diagnosis_document
-
     folder = out or Path("out") / f"{name_of_recording(recording)}_diagnosis"
-    with Bar(quiet) as progress:
+    with Bar(quiet) as progress, _report_aside(recording) as aside:
+        # The second process loads what it needs while this one does.
+        from lab.diagnose_files import diagnose_file
+        from lab.diagnosis_summary import diagnosis_summary
+        from lab.files.diagnosis import diagnosis_document
+
         progress("reading", 0.0)
         diagnosis, known = diagnose_file(
             recording,
@@ -87,6 +93,14 @@ def command(
             force=force,
             command=typed(),
             progress=progress,
+            aside=aside,
         )
     document, text = partial(diagnosis_document, diagnosis), partial(diagnosis_summary, diagnosis, known)
     print_outcome(document, text, diagnosis.warnings, folder, as_json, quiet)
+
+
+def _report_aside(recording: Path) -> AbstractContextManager[Aside | None]:
+    """A second process that draws the report, where it pays."""
+    size = recording.stat().st_size if recording.is_file() else 0
+    pays = ASIDE[0] <= size <= ASIDE[1]
+    return Aside("lab.show.diagnosis_report", "write_diagnosis_report") if pays else nullcontext()

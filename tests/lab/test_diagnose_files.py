@@ -3,6 +3,7 @@
 import json
 import os
 import re
+import sys
 from dataclasses import replace
 from pathlib import Path
 
@@ -100,6 +101,19 @@ def test_the_command_tells_it_on_one_screen(engine, bench, capsys):
     assert len(printed.out.splitlines()) < 40
     assert "written: out, with report.html" in printed.out
     assert "lab diagnose test.h5 --model model.xml --out out" in Path("out/report.html").read_text("utf-8")
+
+
+@pytest.mark.slow
+def test_the_report_of_a_long_recording_is_drawn_aside_and_is_the_same(engine, bench, monkeypatch):
+    asked = (*ASKED, "--out", "out", "--quiet", "--force")
+    assert status(*asked) == 0
+    here = Path("out/report.html").read_bytes()
+    monkeypatch.setattr("lab.aside._cores", lambda: 2)
+    monkeypatch.setattr(sys.modules["lab.cli.diagnose"], "ASIDE", (0, 2**20))
+    monkeypatch.setattr("lab.diagnose_files._write_report", None)  # nobody else may draw
+    assert status(*asked) == 0
+    assert sorted(os.listdir("out")) == OUTPUTS
+    assert Path("out/report.html").read_bytes() == here
 
 
 def test_json_is_the_file_and_nothing_else(engine, bench, capsys):
