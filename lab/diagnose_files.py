@@ -12,7 +12,6 @@ from lab.aside import Aside
 from lab.diagnosis.calibrate import WIDTHS, gain_names, parameters_of
 from lab.diagnosis.diagnose import diagnose
 from lab.diagnosis.outcome import Diagnosis
-from lab.diagnosis.spectral.diagnose import diagnose_spectra
 from lab.effects import EFFECTS
 from lab.effects.effect import Effect
 from lab.errors import LabError, UnknownNameError
@@ -78,8 +77,7 @@ def diagnose_file(
         recording = _named(path, names)
         rig = matched(load_model(model), recording)
         known = None if baseline is None else same_channels(_named(baseline, names), recording)
-        engine: Any = diagnose_spectra if isinstance(recording, FrequencyResponse) else diagnose
-        diagnosis = engine(
+        diagnosis = _engine(recording)(
             recording,
             rig,
             baseline=known,
@@ -136,6 +134,15 @@ def _write_report(*page: Any, **told: Any) -> None:
     from lab.show.diagnosis_report import write_diagnosis_report
 
     write_diagnosis_report(*page, **told)
+
+
+def _engine(recording: Diagnosed) -> Any:
+    """What finds causes in samples, or in frequency responses."""
+    if not isinstance(recording, FrequencyResponse):
+        return diagnose
+    from lab.diagnosis.spectral.diagnose import diagnose_spectra  # slow to load
+
+    return diagnose_spectra
 
 
 def _named(path: str | Path, names: Names) -> Diagnosed:
