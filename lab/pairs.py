@@ -46,13 +46,16 @@ def pairs_of(F: Array) -> Pairs | None:
     if not np.linalg.norm(inverse) * np.linalg.norm(shapes) < NEARLY_PARALLEL:
         return None
     shapes, inverse = units[:, None] * shapes, inverse / units
-    odd = first.size - second.size
-    own = np.concatenate([values[first].real, values[second].real, np.zeros(odd)])
-    other = np.zeros(own.size)
-    other[: upper.size], other[first.size : first.size + upper.size] = values[upper].imag, -values[upper].imag
-    return Pairs(
-        np.pad(shapes, ((0, 0), (0, odd))), np.pad(inverse, ((0, odd), (0, 0))), np.array([own, other])
+    turns = np.zeros((2, 2 * first.size))
+    turns[0, : first.size], turns[0, first.size : first.size + second.size] = (
+        values[first].real,
+        values[second].real,
     )
+    turns[1, : upper.size], turns[1, first.size :][: upper.size] = values[upper].imag, -values[upper].imag
+    if first.size > second.size:
+        shapes = np.concatenate([shapes, np.zeros((len(shapes), 1))], axis=1)
+        inverse = np.concatenate([inverse, np.zeros((1, len(shapes)))])
+    return Pairs(shapes, inverse, turns)
 
 
 def _units(F: Array) -> Array:

@@ -52,6 +52,11 @@ class Path:
 PLAIN = Path()
 
 
+def _acts(path: Path) -> bool:
+    """Whether a path changes anything; most are the very same plain one, which is quick to see."""
+    return path is not PLAIN and path != PLAIN
+
+
 def pushed(paths: Sequence[Path], inputs: Array, dt: float) -> list[Array]:
     """Forces that the actuators make of recorded inputs (n_inputs, n_samples), held over each sample.
 
@@ -65,7 +70,7 @@ def pushed(paths: Sequence[Path], inputs: Array, dt: float) -> list[Array]:
             from scipy.signal import lfilter  # slow to load, and only lagging actuators need it
 
             row = lfilter([share], [1, share - 1], row)
-        force = np.clip(path.gain * row, -path.limit, path.limit) if path != PLAIN else row
+        force = np.clip(path.gain * row, -path.limit, path.limit) if _acts(path) else row
         whole, part = path.parts(dt)
         forces.append(_shifted(force, whole + (part > 0)))
         if part:
@@ -77,7 +82,7 @@ def recorded(paths: Sequence[Path], order: Sequence[int], outputs: Array, dt: fl
     """What the recorder gets of the structure's readings (n_outputs, n_samples); `order` says which on which cable."""
     signals = outputs.copy()
     for i, path in enumerate(paths):
-        if path != PLAIN:
+        if _acts(path):
             signal = path.gain * _shifted(outputs[i], _samples(path, dt)) + _hum(path, outputs.shape[1], dt)
             signals[i] = np.clip(signal, -path.limit, path.limit)
     signals = signals[list(order)] if order else signals
@@ -98,7 +103,7 @@ def structural(paths: Sequence[Path], order: Sequence[int], recorded: Array, dt:
     if order:
         readings[list(order)] = recorded
     for i, path in enumerate(paths):
-        if path != PLAIN:
+        if _acts(path):
             clipped = np.abs(readings[i]) >= path.limit
             gain = path.gain if abs(path.gain) > 1e-6 else np.nan
             readings[i] = np.where(clipped, np.nan, (readings[i] - _hum(path, recorded.shape[1], dt)) / gain)

@@ -209,20 +209,18 @@ def ready(plant: Plant, dt: float, *, substeps: int = 6) -> Responder:
     tones = np.array([tone.row for tone in plant.tones]).reshape(-1, n)
     # Accelerations from displacement, velocity, inputs, tones and laws.
     forces = (-plant.stiffness, -plant.damping, plant.forces, tones.T, -rows.T)
-    from_q, from_v, from_u, from_t, from_g = np.split(
-        np.linalg.solve(plant.mass, np.hstack(forces)),
-        np.cumsum([force.shape[1] for force in forces])[:-1],
-        axis=1,
-    )
+    moved = np.linalg.solve(plant.mass, np.concatenate(forces, axis=1))
+    from_q, from_v, from_u = moved[:, :n], moved[:, n : 2 * n], moved[:, 2 * n : 2 * n + n_in]
+    from_t, from_g = moved[:, 2 * n + n_in :][:, : len(tones)], moved[:, 2 * n + n_in + len(tones) :]
     lagging_in = [i for i, path in enumerate(plant.input_paths) if path.lag]
     lagging_out = [i for i, path in enumerate(plant.output_paths) if path.lag]
     late = [i for i, path in enumerate(plant.input_paths) if path.delay and path.parts(dt)[1]]
     a, b = 2 * n + len(lagging_in), 2 * n + len(lagging_in) + len(lagging_out)
     n_u = n_in + len(late) + len(tones)
     A, B, W = np.zeros((b, b)), np.zeros((b, n_u)), np.zeros((b, len(rows)))
-    A[:n, n : 2 * n] = np.eye(n)
+    np.fill_diagonal(A[:n, n : 2 * n], 1.0)
     A[n : 2 * n, :n], A[n : 2 * n, n : 2 * n] = from_q, from_v
-    B[n : 2 * n] = np.hstack([from_u, from_u[:, late], from_t])
+    B[n : 2 * n] = np.concatenate([from_u, from_u[:, late], from_t], axis=1)
     W[n : 2 * n] = from_g
     # Every column of inputs belongs to a channel; a late one has two, before and after its force changes.
     columns = [*range(n_in), *late]
@@ -241,8 +239,9 @@ def ready(plant: Plant, dt: float, *, substeps: int = 6) -> Responder:
         C[i], D[i], E[i] = np.eye(b)[slot], 0.0, 0.0
     changes = {n_in + j: (i, plant.input_paths[i].parts(dt)[1] * dt) for j, i in enumerate(late)}
     F, held, P, Q = _over_a_substep(A, B, W, dt / sub)
-    starts = np.arange(sub) * dt / sub
-    G = np.stack([_inputs_over(A, B, t, dt / sub, changes) if changes else held for t in starts])
+    G = np.stack(
+        [_inputs_over(A, B, step * dt / sub, dt / sub, changes) if changes else held for step in range(sub)]
+    )
     dry = [i for i, law in enumerate(plant.laws) if law.kind == COULOMB and not law.parameters[1]]
     Q[:, dry] += P[:, dry]
     P[:, dry] = 0.0
@@ -274,9 +273,13 @@ def _late_readings(
 
     Each is taken from the start of the last substep before it.
     """
-    both, at, C, D, E = D, np.zeros(len(C), dtype=np.int64), C.copy(), _acting(D, 0.0, changes), E.copy()
-    for i, path in enumerate(plant.output_paths):
-        ahead = (1 - path.parts(dt)[1]) * dt if path.delay else dt
+    at = np.zeros(len(C), dtype=np.int64)
+    delayed = [i for i, path in enumerate(plant.output_paths) if path.delay]
+    if not (delayed or changes):
+        return at, C, D, E
+    both, C, D, E = D, C.copy(), _acting(D, 0.0, changes), E.copy()
+    for i in delayed:
+        ahead = (1 - plant.output_paths[i].parts(dt)[1]) * dt
         if ahead < dt:
             at[i] = min(int(ahead / dt * sub + 1e-9), sub - 1)
             start = at[i] * dt / sub

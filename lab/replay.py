@@ -18,9 +18,9 @@ from lab.stepping import highest_frequency
 
 MOST_SUBSTEPS = 256
 """Where doubling the substeps ends, converged or not."""
-KINKED_SUBSTEPS = 64
-"""Of forces with kinks, where the error falls with the root of the substep only: dry friction of MuJoCo then errs by one
-percent of accelerations."""
+DRY_SUBSTEPS = 64
+"""Of dry friction, where the error falls with the root of the substep only: that of MuJoCo then errs by one percent of
+accelerations."""
 
 Respond = Callable[..., Recording]
 
@@ -61,8 +61,8 @@ def replay(
     Args:
         rig: with the channels of the recording connected.
         recording: whose inputs drive it.
-        accuracy: relative error that is small enough, in the root mean square where the rig is not linear; where forces have
-            kinks, what can be reached is taken.
+        accuracy: relative error that is small enough, in the root mean square where the rig is not linear; under dry
+            friction, what can be reached is taken.
         starts: displacement and velocity at the start of each record; all begin at rest when None.
     """
     outputs = []
@@ -91,8 +91,8 @@ def _refined(rig: Rig, respond: Respond, dt: float, accuracy: float) -> Array:
 
 def _doubled(rig: Rig, respond: Respond, dt: float, accuracy: float) -> Array:
     """Outputs with substeps doubled until they stay what they are in the root mean square."""
-    if not rig.smooth:
-        return _outputs(respond(substeps=KINKED_SUBSTEPS))
+    if np.any(rig.model.dof_frictionloss) or np.any(rig.model.tendon_frictionloss):
+        return _outputs(respond(substeps=DRY_SUBSTEPS))
     substeps = 2 ** int(np.ceil(np.log2(max(highest_frequency(rig) * dt, 4.0))))
     coarse = _outputs(respond(substeps=substeps))
     while True:

@@ -11,7 +11,7 @@ import numpy as np
 from identification.recording import DERIVATIVE, Array
 from lab import forces, laws, linearize, stages
 from lab.errors import RigError
-from lab.paths import ORDER, Path
+from lab.paths import ORDER, PLAIN, Path
 from lab.plant import Law, Plant, Tone
 from lab.ports import is_law
 from lab.rig import Rig, Spring
@@ -86,8 +86,8 @@ def twin(rig: Rig) -> Twin:
         *motion,
         rig.inputs,
         rig.outputs,
-        (Path(),) * len(rig.inputs),
-        (Path(),) * len(rig.outputs),
+        (PLAIN,) * len(rig.inputs),
+        (PLAIN,) * len(rig.outputs),
         stiffness,
         damping,
         (*local, *_frictions(rig, rows), *_user_laws(rig, rows)),
@@ -259,10 +259,11 @@ def _behind_chain(rig: Rig, plant: Plant) -> Plant:
         ("sensors", rig.outputs, Plant.with_output),
     ):
         for i, channel in enumerate(channels):
-            path = Path()
+            path = PLAIN
             for stage in _in_order(chain.for_channel(place, channel.name), place):
                 path = _passed(path, stage)
-            plant = change(plant, i, **vars(path))
+            if path is not PLAIN:
+                plant = change(plant, i, **vars(path))
     names = [channel.name for channel in rig.outputs]
     for stage in chain.acquisition:
         if isinstance(stage, stages.BandLimitedLag):

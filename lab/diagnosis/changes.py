@@ -5,6 +5,7 @@ from __future__ import annotations
 import itertools
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
+from functools import partial
 
 import numpy as np
 
@@ -16,6 +17,7 @@ from lab.diagnosis.starts import best_starts
 from lab.effects import EFFECTS
 from lab.effects.effect import EVERYWHERE, Effect
 from lab.effects.missing_spring import MissingSpring
+from lab.hands import shared
 
 OWN_PARAMETERS = {"mass": "mass_change", "stiffness": "stiffness_change", "damping": "damping_change"}
 OWN_CHANGES = {cause: EFFECTS[cause] for cause in OWN_PARAMETERS.values()}
@@ -31,6 +33,9 @@ WORTH = 20.0
 FOLLOWED = 4
 FAR = 4.0
 """Widths beyond which a parameter may have gone to make up for a cause, which then shows better from the model as given."""
+
+_Trial = tuple[float, str, str, Array, Array]
+"""-2 log posterior of a large change, its cause, location and direction, and the parameters with it."""
 
 
 def starts(misfit: Misfit, theta: Array) -> list[Array]:
@@ -59,28 +64,38 @@ def large_changes(
     Each is tried at a few factors and followed from the best, its prior lifted: a doubled mass moves a resonance so far that
     slopes at the model's own value point nowhere.
     """
-    tried = []
     seen = _windowed(misfit)
     reference = _level(seen, present, present.theta, present.causes)
     trying, following = work.parts(2.0, 1.0)
-    for (cause, location, direction), start in trying.each(
-        list(itertools.product(directions(misfit, effects), starts(misfit, present.theta)))
-    ):
-        lifted = replace(seen, parameters=misfit.parameters.lifted(direction))
-        for factor in DAMPING_FACTORS if cause == "damping_change" else FACTORS:
-            theta = start + np.log(factor) * direction / misfit.parameters.widths
-            theta = _restarted(seen, theta)
-            tried.append((_level(lifted, present, theta, present.causes), cause, location, direction, theta))
-    best: dict[tuple[str, str], tuple[float, str, str, Array, Array]] = {}
+    begun = list(itertools.product(directions(misfit, effects), starts(misfit, present.theta)))
+    tried = trying.each(shared(partial(_best_factor, seen, present), begun), len(begun))
+    best: dict[tuple[str, str], _Trial] = {}
     for trial in sorted(tried, key=lambda trial: trial[0]):
         best.setdefault(trial[1:3], trial)
-    found = []
-    for reached, cause, location, direction, theta in following.each(list(best.values())[:FOLLOWED]):
-        if reached < reference - WORTH:
-            changed = replace(misfit, parameters=misfit.parameters.lifted(direction))
-            refit = fit(changed, theta, present.causes, observer=present.observer, iterations=15)
-            found.append((cause, location, direction, refit))
-    return found
+    followed = [trial for trial in list(best.values())[:FOLLOWED] if trial[0] < reference - WORTH]
+    refits = following.each(shared(partial(_followed, misfit, present), followed), len(followed))
+    return [
+        (cause, location, direction, refit)
+        for (_, cause, location, direction, _), refit in zip(followed, refits, strict=True)
+    ]
+
+
+def _best_factor(seen: Misfit, present: Fit, begun: tuple[tuple[str, str, Array], Array]) -> _Trial:
+    """The likeliest of the factors on what a direction changes."""
+    (cause, location, direction), start = begun
+    lifted = replace(seen, parameters=seen.parameters.lifted(direction))
+    trials = []
+    for factor in DAMPING_FACTORS if cause == "damping_change" else FACTORS:
+        theta = _restarted(seen, start + np.log(factor) * direction / seen.parameters.widths)
+        trials.append((_level(lifted, present, theta, present.causes), cause, location, direction, theta))
+    return min(trials, key=lambda trial: trial[0])
+
+
+def _followed(misfit: Misfit, present: Fit, trial: _Trial) -> Fit:
+    """The fit that a trial leads to, its prior lifted."""
+    _, _, _, direction, theta = trial
+    changed = replace(misfit, parameters=misfit.parameters.lifted(direction))
+    return fit(changed, theta, present.causes, observer=present.observer, iterations=15)
 
 
 def stiff_springs(
@@ -94,20 +109,23 @@ def stiff_springs(
     seen, followed = _windowed(misfit), []
     for theta in work.each((present.theta, misfit.parameters.nominal(present.theta))):
         reference = _level(seen, present, theta, present.causes) - WORTH
-        best = []
-        for h in proposed:
-            if h.kind is MissingSpring:
-                springs = [h.at(np.array([factor])) for factor in SPRING_FACTORS]
-                levels = [
-                    (_level(seen, present, theta, (*present.causes, spring)), spring) for spring in springs
-                ]
-                best.append(min(levels, key=lambda trial: trial[0]))
+        springs = [h for h in proposed if h.kind is MissingSpring]
+        best = list(shared(partial(_best_stiffness, seen, present, theta), springs))
         best.sort(key=lambda trial: trial[0])
         followed += [(theta, h) for reached, h in best[: FOLLOWED // 2] if reached < reference]
-    return [
-        fit(misfit, theta, (*present.causes, h), observer=present.observer, iterations=15)
-        for theta, h in followed
-    ]
+    return list(shared(partial(_sprung, misfit, present), followed))
+
+
+def _best_stiffness(seen: Misfit, present: Fit, theta: Array, spring: Hypothesis) -> tuple[float, Hypothesis]:
+    """The likeliest of the stiffnesses of a missing spring."""
+    springs = [spring.at(np.array([factor])) for factor in SPRING_FACTORS]
+    levels = [(_level(seen, present, theta, (*present.causes, each)), each) for each in springs]
+    return min(levels, key=lambda trial: trial[0])
+
+
+def _sprung(misfit: Misfit, present: Fit, begun: tuple[Array, Hypothesis]) -> Fit:
+    theta, spring = begun
+    return fit(misfit, theta, (*present.causes, spring), observer=present.observer, iterations=15)
 
 
 def _windowed(misfit: Misfit) -> Misfit:

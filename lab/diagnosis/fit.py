@@ -3,15 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
-from os import cpu_count
 
 import numpy as np
 
 from identification.recording import Array
 from lab.diagnosis.misfit import Hypothesis, Misfit
 from lab.forces import KINKED
+from lab.hands import beside
 from lab.plant import NO_OBSERVER
 
 STEP, KINKED_STEP, CAUSE_STEP = 1e-3, 3e-2, 1e-3
@@ -21,7 +20,6 @@ EASED, KINKED_EASED, LEAST = 30.0, 8.0, 1e-8
 """Damping falls by so much after a good step, and so far: along a valley where only the prior tells, such as all masses,
 stiffnesses and dampings against the gain of the only actuator, the curvature is that much less than across.
 Jags ask for caution."""
-POOL = ThreadPoolExecutor(min(cpu_count() or 1, 8))
 
 
 @dataclass(frozen=True, eq=False)
@@ -93,7 +91,7 @@ def theta_slopes(
         moved[j] += step
         return (misfit.residual(moved, causes, observer=observer, n_train=n_train) - residual) / step
 
-    return np.array(list(POOL.map(slope, range(theta.size)))).reshape(-1, *residual.shape)
+    return np.array(list(beside(slope, range(theta.size)))).reshape(-1, *residual.shape)
 
 
 def cause_slopes(
@@ -126,6 +124,35 @@ def cause_slopes(
 def _kinked(misfit: Misfit, theta: Array, causes: Sequence[Hypothesis]) -> bool:
     """Whether a law with kinks is in the plant."""
     return any(law.kind in KINKED for law in misfit.plant(theta, causes).laws)
+
+
+def _known(slopes: Array) -> Array:
+    """Slopes with zeros where a step to the side diverges: nothing is known of that variable and it stays."""
+    known = np.all(np.isfinite(slopes), axis=(1, 2))
+    return slopes if np.all(known) else np.where(known[:, None, None], slopes, 0.0)
+
+
+class _Linear:
+    """Slopes of the parameters and what they have in common, channel by channel, for as long as the slopes are kept."""
+
+    def __init__(self, slopes: Array) -> None:
+        slopes = _known(slopes)
+        self.rows = slopes.reshape(len(slopes), slopes.shape[1] * slopes.shape[2])
+        # (n_outputs, n_parameters, n_parameters)
+        self.products = np.matmul(slopes.transpose(1, 0, 2), slopes.transpose(1, 2, 0))
+
+    def beside(self, own: Array, residual: Array, w: Array) -> tuple[Array, Array]:
+        """Information and gradient of parameters and causes, whose slopes are `own`, with channels weighted by `w`."""
+        n, size = len(self.rows), len(self.rows) + len(own)
+        flat = own.reshape(len(own), residual.size)
+        weighted = (own * w[:, None] ** 2).reshape(flat.shape)
+        information = np.empty((size, size))
+        information[:n, :n] = np.tensordot(w**2, self.products, axes=1)
+        information[:n, n:] = self.rows @ weighted.T
+        information[n:, :n] = information[:n, n:].T
+        information[n:, n:] = flat @ weighted.T
+        r = (residual * w[:, None] ** 2).ravel()
+        return information, np.concatenate([self.rows @ r, flat @ r])
 
 
 def moved_by(causes: Sequence[Hypothesis], step: Array) -> tuple[Hypothesis, ...]:
@@ -168,7 +195,7 @@ def fit(
     P = misfit.parameters.precision
     f, damping = objective(e, theta, P, misfit.colour), 1e-3
     age = refresh if slopes is None else 1
-    slopes = np.zeros((0, *e.shape)) if slopes is None else slopes
+    linear = _Linear(np.zeros((0, *e.shape)) if slopes is None else slopes)
     size = n + sum(cause.n for cause in causes)
     prior = np.zeros((size, size))
     prior[:n, :n] = P
@@ -176,17 +203,14 @@ def fit(
     eased = KINKED_EASED if _kinked(misfit, theta, causes) else EASED
     for _ in range(iterations):
         if age >= refresh:
-            slopes, age = theta_slopes(misfit, theta, causes, observer, e, n_train), 0
+            linear, age = _Linear(theta_slopes(misfit, theta, causes, observer, e, n_train)), 0
         fresh = age == 0
         age += 1
-        J = np.concatenate([slopes, cause_slopes(misfit, theta, causes, observer, e, n_train)])
-        # Where a step to the side diverges, nothing is known of that variable and it stays.
-        J[~np.all(np.isfinite(J), axis=(1, 2))] = 0.0
         w = weights(e, misfit.colour)
-        Jw = (J * w[:, None]).reshape(size, -1)
-        information = Jw @ Jw.T
+        own = _known(cause_slopes(misfit, theta, causes, observer, e, n_train))
+        information, g = linear.beside(own, e, w)
         H = information + prior
-        g = Jw @ (e * w[:, None]).ravel() + prior[:, :n] @ theta
+        g = g + prior[:, :n] @ theta
         if not (np.isfinite(f) and np.all(np.isfinite(H))):
             break
         # A cause can stop at an edge, such as a delay of a whole sample: then the parameters go on without it.

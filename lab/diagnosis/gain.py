@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from functools import partial
 
 import numpy as np
 
@@ -12,6 +13,7 @@ from lab.diagnosis.fit import Fit
 from lab.diagnosis.misfit import Misfit
 from lab.diagnosis.outcome import Errors, Prediction
 from lab.diagnosis.starts import start_of
+from lab.hands import shared
 from lab.replay import replay
 from lab.rig import Rig
 
@@ -38,22 +40,28 @@ def predictions_of(
         accuracy: of the simulation.
         work: told of every rig.
     """
-    dofs = rigs[0].dofs
-
-    def simulated(rig: Rig, begins: Sequence[Array | None]) -> list[Array]:
-        motions = [None if start is None else start_of(rig, dofs, start) for start in begins]
-        return replay(rig, recording, accuracy=accuracy, starts=motions)
-
-    # One after the other: MuJoCo's callbacks belong to the whole process.
+    # Never in two threads: MuJoCo's callbacks belong to the whole process.
+    simulated = shared(
+        partial(_simulated, recording, rigs[0].dofs, accuracy), list(zip(rigs, starts, strict=True))
+    )
     return tuple(
         Prediction(measured, nominal, calibrated, extended, first)
         for (_, measured), nominal, calibrated, extended, first in zip(
-            misfit.records,
-            *work.each(map(simulated, rigs, starts), len(rigs)),
-            misfit.n_train,
-            strict=True,
+            misfit.records, *work.each(simulated, len(rigs)), misfit.n_train, strict=True
         )
     )
+
+
+def _simulated(
+    recording: Recording,
+    dofs: tuple[str, ...],
+    accuracy: float,
+    driven: tuple[Rig, Sequence[Array | None]],
+) -> list[Array]:
+    """Outputs of a rig that starts each record as told in terms of `dofs`, by MuJoCo."""
+    rig, begins = driven
+    motions = [None if start is None else start_of(rig, dofs, start) for start in begins]
+    return replay(rig, recording, accuracy=accuracy, starts=motions)
 
 
 def errors_of(predictions: Sequence[Prediction], floor: float) -> Errors:

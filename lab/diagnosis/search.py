@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
+from functools import partial
 
 import numpy as np
 
@@ -22,6 +23,7 @@ from lab.diagnosis.plausible import plausible
 from lab.diagnosis.screening import Screened, hypotheses, screen
 from lab.diagnosis.tolerance import confirmed, wrong_parameters
 from lab.effects.effect import Effect
+from lab.hands import shared
 
 REFITTED, PER_CAUSE, POLISHED = 10, 2, 3
 ROUGH = 4
@@ -71,9 +73,10 @@ def search(
     own_and_named = {**OWN_CHANGES, **effects}
     refits = _refitted(calibration, present, _picked(screened.rows), refitting)
     scored = sorted((last_of(f, g, without) for f, g in refits), key=lambda c: -c.gain)
-    best = [_polished(misfit, c, without) for c in polishing.each(scored[:POLISHED])] + scored[POLISHED:]
+    leaders = shared(partial(_polished, misfit, without), scored[:POLISHED])
+    best = [*polishing.each(leaders, POLISHED), *scored[POLISHED:]]
     own = sorted(wrong_parameters(misfit, present, without, own_and_named), key=lambda c: -c.gain)
-    candidates = [confirmed(misfit, c, without) for c in confirming.each(own[:POLISHED])]
+    candidates = list(confirming.each(shared(partial(confirmed, misfit, without), own[:POLISHED]), POLISHED))
     # What was not confirmed may not rank before what was.
     weakest = min((c.gain for c in candidates), default=0.0)
     candidates += [replace(c, gain=min(c.gain, weakest)) for c in own[POLISHED:]]
@@ -124,47 +127,75 @@ def _refitted(
         (row.theta, (*present.causes, row.hypothesis), None) for row in picked
     ]
     *leading_, rough, whole = work.parts(*[3.0 for _ in shares], 2.0, 3.0)
-    for share, part in zip(shares, leading_, strict=True):
-        led = [
-            tried(misfit, theta, causes, kalman_gain(misfit, theta, share), iterations=3, tolerance=20)
-            for theta, causes, _ in part.each(running)
-        ]
-        running = [(f.theta, f.causes, f) for f in leading([f for f in led if f is not None])]
     # Causes are small at first: those who start together share the slopes of the model without them.
-    slopes = {} if shares else _shared_slopes(misfit, present, [row.theta for row in picked])
-    first = [
-        (
-            tried(
-                misfit,
-                theta,
-                causes,
-                present.observer,
-                iterations=ROUGH,
-                refresh=3,
-                tolerance=1,
-                slopes=slopes.get(id(theta)),
-            ),
-            guided,
+    near = [_Near.at(misfit, theta, present, shares[0] if shares else 0.0) for theta in _starts_of(picked)]
+    for share, part in zip(shares, leading_, strict=True):
+        led = part.each(
+            shared(partial(_led, misfit, share, near), [row[:2] for row in running]), len(running)
         )
-        for theta, causes, guided in rough.each(running)
-    ]
-    plain = {id(f): guided for f, guided in first if f is not None}
-    kept = leading([f for f, _ in first if f is not None])
-    found = [
-        (tried(misfit, f.theta, f.causes, present.observer, iterations=6), plain[id(f)])
-        for f in whole.each(kept)
-    ]
+        running = [(f.theta, f.causes, f) for f in leading([f for f in led if f is not None])]
+        near = []
+    roughly = shared(partial(_roughly, misfit, present.observer, near), [row[:2] for row in running])
+    fits = list(rough.each(roughly, len(running)))
+    plain = {id(f): guided for f, (_, _, guided) in zip(fits, running, strict=True)}
+    kept = leading([f for f in fits if f is not None])
+    wholly = shared(partial(_wholly, misfit, present.observer), [(f.theta, f.causes) for f in kept])
+    found = [(f, plain[id(start)]) for f, start in zip(whole.each(wholly, len(kept)), kept, strict=True)]
     return [(f, guided) for f, guided in found if f is not None]
 
 
-def _shared_slopes(misfit: Misfit, present: Fit, starts: Sequence[Array]) -> dict[int, Array]:
-    """Slopes of the parameters beside the causes present, by the identity of the start."""
-    slopes = {}
-    for theta in starts:
-        if id(theta) not in slopes:
-            e = misfit.residual(theta, present.causes, observer=present.observer)
-            slopes[id(theta)] = theta_slopes(misfit, theta, present.causes, present.observer, e, None)
-    return slopes
+_Begin = tuple[Array, tuple[Hypothesis, ...]]
+"""Parameters and causes from which a fit begins."""
+
+
+@dataclass(frozen=True, eq=False)
+class _Near:
+    """Slopes of the parameters near a start, without the causes that start there.
+
+    Attributes:
+        theta: parameters at the start.
+        observer: gain that pulled the state to the measurements.
+        slopes: of the residual, (n_parameters, n_outputs, n).
+    """
+
+    theta: Array
+    observer: Array
+    slopes: Array
+
+    @classmethod
+    def at(cls, misfit: Misfit, theta: Array, present: Fit, share: float) -> _Near:
+        """Slopes with an unknown force of that share, or with the observer of the fit so far."""
+        observer = kalman_gain(misfit, theta, share) if share else present.observer
+        e = misfit.residual(theta, present.causes, observer=observer)
+        return cls(theta, observer, theta_slopes(misfit, theta, present.causes, observer, e, None))
+
+
+def _nearest(near: Sequence[_Near], theta: Array) -> _Near | None:
+    return next((each for each in near if np.array_equal(each.theta, theta)), None)
+
+
+def _starts_of(picked: Sequence[Screened]) -> list[Array]:
+    """The different parameters that fits begin from."""
+    return list({row.theta.tobytes(): row.theta for row in picked}.values())
+
+
+def _led(misfit: Misfit, share: float, near: Sequence[_Near], begin: _Begin) -> Fit | None:
+    """A fit that an unknown force of that share keeps near the measurements."""
+    known = _nearest(near, begin[0])
+    observer = kalman_gain(misfit, begin[0], share) if known is None else known.observer
+    slopes = None if known is None else known.slopes
+    return tried(misfit, *begin, observer, iterations=3, tolerance=20, slopes=slopes)
+
+
+def _roughly(misfit: Misfit, observer: Array, near: Sequence[_Near], begin: _Begin) -> Fit | None:
+    """A fit good enough to compare."""
+    known = _nearest(near, begin[0])
+    slopes = None if known is None else known.slopes
+    return tried(misfit, *begin, observer, iterations=ROUGH, refresh=3, tolerance=1, slopes=slopes)
+
+
+def _wholly(misfit: Misfit, observer: Array, begin: _Begin) -> Fit | None:
+    return tried(misfit, *begin, observer, iterations=6)
 
 
 def tried(
@@ -203,7 +234,7 @@ def leading(fits: Sequence[Fit]) -> list[Fit]:
     return [f for i, f in enumerate(ordered) if i < KEPT or price[id(f)] < price[id(ordered[0])] + CLOSE]
 
 
-def _polished(misfit: Misfit, candidate: Candidate, without: float) -> Candidate:
+def _polished(misfit: Misfit, without: float, candidate: Candidate) -> Candidate:
     """The candidate fitted to full convergence."""
     found = candidate.fit
     polished = fit(
@@ -212,7 +243,6 @@ def _polished(misfit: Misfit, candidate: Candidate, without: float) -> Candidate
         found.causes,
         observer=found.observer,
         iterations=15,
-        refresh=1,
         tolerance=0.1,
     )
     return max(candidate, last_of(polished, candidate.guided, without), key=lambda c: c.gain)

@@ -59,7 +59,7 @@ def _off(candidate: Candidate) -> float:
     return float(candidate.fit.theta @ candidate.direction)
 
 
-def confirmed(misfit: Misfit, candidate: Candidate, without: float) -> Candidate:
+def confirmed(misfit: Misfit, without: float, candidate: Candidate) -> Candidate:
     """The candidate, a change of the model's own, fitted with its prior lifted: what a quadratic promises may not come true."""
     assert candidate.direction is not None
     parameters, shared = misfit.parameters.lifted(candidate.direction), 1.0

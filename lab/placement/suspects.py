@@ -11,11 +11,12 @@ from identification.information import planned
 from identification.recording import Array, Channel
 from lab.diagnosis.calibrate import parameters_of, survey_of
 from lab.diagnosis.changes import OWN_PARAMETERS
-from lab.diagnosis.fit import POOL, theta_slopes
+from lab.diagnosis.fit import theta_slopes
 from lab.diagnosis.misfit import Hypothesis, Misfit
 from lab.diagnosis.screening import hypotheses
 from lab.effects import EFFECTS
 from lab.errors import LabError, UnknownNameError
+from lab.hands import beside
 from lab.placement.plan import Plan
 from lab.plant import NO_OBSERVER
 from lab.rig import Rig
@@ -98,7 +99,7 @@ def suspects(
     def effect(probe: Hypothesis | int) -> Array:
         return slopes[probe] if isinstance(probe, int) else -misfit.residual(theta, (probe,))
 
-    effects = np.array(list(POOL.map(effect, probes)))
+    effects = np.array(list(beside(effect, probes)))
     if like is not None:
         # What runs away in this test shows itself, but not how: it counts as unseen.
         effects[~np.all(np.isfinite(effects), axis=(1, 2))] = 0.0

@@ -50,11 +50,11 @@ class Crew:
 @contextmanager
 def local_crew(workers: int | None = None) -> Iterator[Crew]:
     """Processes of this machine, one run each at a time; as many as there are cores when None."""
-    n = workers or _cores()
+    n = workers or cores()
     before = set(multiprocessing.active_children())
-    # Fresh processes share nothing with this one; each has one thread, or sums would depend on the number of cores.
+    # Each has one thread, or sums would depend on the number of cores.
     with _one_thread_each():
-        crew = Crew(lambda: _pool(n), lambda: n, renewable=True)
+        crew = Crew(lambda: process_pool(n), lambda: n, renewable=True)
         try:
             yield crew
         except BaseException:
@@ -118,12 +118,16 @@ def _now_and_then(ask: Callable[[], int], seconds: float = 5.0) -> Callable[[], 
     return size
 
 
-def _pool(n: int) -> ProcessPoolExecutor:
-    return ProcessPoolExecutor(n, mp_context=multiprocessing.get_context("spawn"), initializer=_settle)
+def process_pool(n: int, begin: Callable[[], None] | None = None) -> ProcessPoolExecutor:
+    """Fresh processes, which share nothing with this one; each begins with `begin`, and ends when this one does."""
+    spawn = multiprocessing.get_context("spawn")
+    return ProcessPoolExecutor(n, mp_context=spawn, initializer=_settle, initargs=(begin,))
 
 
-def _settle() -> None:
+def _settle(begin: Callable[[], None] | None) -> None:
     """Makes a worker leave stopping to its parent, and leave with it."""
+    if begin is not None:
+        begin()
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     parent = multiprocessing.parent_process()
     assert parent is not None
@@ -135,7 +139,8 @@ def _settle() -> None:
     threading.Thread(target=leave, daemon=True).start()
 
 
-def _cores() -> int:
+def cores() -> int:
+    """Cores that this process may use."""
     if hasattr(os, "sched_getaffinity"):
         return len(os.sched_getaffinity(0))
     return os.cpu_count() or 1

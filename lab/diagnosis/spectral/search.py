@@ -11,7 +11,6 @@ import numpy as np
 from identification.recording import Array
 from lab.diagnosis.candidate import Candidate
 from lab.diagnosis.evidence import minus_two_log_evidence
-from lab.diagnosis.fit import POOL
 from lab.diagnosis.misfit import Hypothesis
 from lab.diagnosis.plausible import plausible
 from lab.diagnosis.screening import hypotheses
@@ -19,6 +18,7 @@ from lab.diagnosis.spectral.changes import changes
 from lab.diagnosis.spectral.fit import Point, SpectralFit, fit, point, slopes, system, whitened_error
 from lab.diagnosis.spectral.likelihood import Likelihood
 from lab.effects.effect import Effect
+from lab.hands import beside
 
 REFITTED, PER_CAUSE, POLISHED = 7, 2, 3
 NEUTRAL = 1e-9
@@ -69,7 +69,7 @@ def screen(likelihood: Likelihood, anchor: SpectralFit, proposed: Sequence[Hypot
             return Screened(h, -np.inf)
         return Screened(h, gain - max(h.n, 1) * price)
 
-    return sorted(POOL.map(score, proposed), key=lambda s: -s.score)
+    return sorted(beside(score, proposed), key=lambda s: -s.score)
 
 
 def search(
