@@ -8,7 +8,6 @@ from typing import Any
 
 from identification.progress import UNHEARD, Progress, Work
 from identification.response import FrequencyResponse
-from lab.aside import Aside
 from lab.diagnosis.calibrate import WIDTHS, gain_names, parameters_of
 from lab.diagnosis.diagnose import diagnose
 from lab.diagnosis.outcome import Diagnosis
@@ -21,6 +20,7 @@ from lab.files.folder import output_folder
 from lab.files.model import load_model
 from lab.files.recording import load
 from lab.files.recording_responses import load_responses, only_responses
+from lab.hands import meanwhile
 from lab.matching import Names, matched, read_mapping, renamed, same_channels
 from lab.replay import Replay
 from lab.rig import Rig
@@ -46,7 +46,6 @@ def diagnose_file(
     force: bool = False,
     command: str = "",
     progress: Progress | None = None,
-    aside: Aside | None = None,
 ) -> tuple[Diagnosis, Diagnosed]:
     """What a model gets wrong in a recording: found, written, shown.
 
@@ -61,7 +60,6 @@ def diagnose_file(
         force: replace an earlier output there.
         command: how the lab was called, for the report.
         progress: told what is being done, and the share of it that is done; it falls where the search goes on.
-        aside: second process for `write_diagnosis_report`, that draws the report; this one does when None.
 
     Returns:
         The diagnosis, and what it was found in, with channels as the model names them.
@@ -86,9 +84,7 @@ def diagnose_file(
             progress=None if progress is None else diagnosing,
         )
         facts = _facts({"Recording": path, "Model": model, "Baseline": baseline, "Names": mapping})
-        present_diagnosis(
-            folder, diagnosis, recording, command=command, facts=facts, work=writing, aside=aside
-        )
+        present_diagnosis(folder, diagnosis, recording, command=command, facts=facts, work=writing)
     return diagnosis, recording
 
 
@@ -100,7 +96,6 @@ def present_diagnosis(
     command: str = "",
     facts: dict[str, str] | None = None,
     work: Work = UNHEARD,
-    aside: Aside | None = None,
 ) -> None:
     """Writes diagnosis.json, extended.xml, report.html and run.rrd into a folder.
 
@@ -111,23 +106,20 @@ def present_diagnosis(
         command: how the lab was called.
         facts: further facts to reproduce it, by name.
         work: told how much of this is done.
-        aside: second process for `write_diagnosis_report`, that draws the report meanwhile; this one does when None.
     """
-    reporting, showing = work.called("writing the report").parts(3.5, 2.0)
+    showing, reporting = work.called("writing the report").parts(2.0, 3.5)
     save_diagnosis(diagnosis, folder / "diagnosis.json")
     diagnosis.extended.save(folder / "extended.xml")
-    page = (folder / "report.html", diagnosis, recording)
-    told = {"command": command, "facts": facts}
-    drawn_aside = aside is not None and aside.begin(*page, **told)
-    if not drawn_aside:
-        _write_report(*page, **told, work=reporting)
-    showing.done(0.0)
+    report = meanwhile(
+        _write_report, folder / "report.html", diagnosis, recording, command=command, facts=facts
+    )
     # Imported here because drawing is slow to load and `lab` must come up without it.
     from lab.show.rerun_log.diagnosis import write_diagnosis_rrd
 
     write_diagnosis_rrd(folder / "run.rrd", diagnosis, recording, motions=_first_swings(diagnosis, recording))
-    if drawn_aside and aside is not None and not aside.done():
-        _write_report(*page, **told, work=reporting)
+    showing.done()
+    report()
+    reporting.done()
 
 
 def _write_report(*page: Any, **told: Any) -> None:

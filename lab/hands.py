@@ -2,15 +2,17 @@
 
 from __future__ import annotations
 
+import importlib
+import multiprocessing
 import os
 import pickle
 import tempfile
 from collections import deque
 from collections.abc import Callable, Iterable, Iterator, Sequence
-from concurrent.futures import BrokenExecutor, Executor, Future, ThreadPoolExecutor
+from concurrent.futures import Executor, Future, ThreadPoolExecutor
 from contextlib import contextmanager
 from dataclasses import dataclass
-from functools import lru_cache
+from functools import lru_cache, partial
 from pathlib import Path
 from typing import Any, TypeVar
 
@@ -30,7 +32,7 @@ class Hands:
     Attributes:
         threads: of this process.
         alone: whether threads would only get in the way, since every core is taken.
-        helpers: processes beside this one.
+        helpers: processes beside this one; None where nobody called any.
         n_helpers: how many.
         folder: where they find what to do.
     """
@@ -46,26 +48,34 @@ HANDS = Hands(ThreadPoolExecutor(min(os.cpu_count() or 1, 8)))
 
 
 @contextmanager
-def helped(n: int | None = None) -> Iterator[None]:
-    """Calls processes to help with what is shared meanwhile; as many as there are further cores when None.
+def helped(*modules: str, n: int | None = None) -> Iterator[None]:
+    """Calls processes that help for as long as this lasts.
 
-    They begin a Python of their own, which takes about a second, so that this is for long work in programs whose main module
-    can be imported.
+    Each begins a Python of its own, which takes about a second: this is for long work, in programs whose main module may be
+    imported again. Where a helper fails or is lost, its piece is done here, so that results and errors are the same.
+
+    Args:
+        modules: that they load at once.
+        n: how many; one for each further core when None.
     """
     n = cores() - 1 if n is None else n
     if n < 1 or HANDS.helpers is not None or HANDS.alone:
         yield
         return
+    before = set(multiprocessing.active_children())
     with tempfile.TemporaryDirectory(prefix="lab-") as folder:
         executor = process_pool(n, _begin)
         for _ in range(n):
-            executor.submit(_begun)
+            executor.submit(_load, modules)
         HANDS.helpers, HANDS.n_helpers, HANDS.folder = executor, n, folder
         try:
             yield
         finally:
             HANDS.helpers, HANDS.n_helpers = None, 0
-            executor.shutdown(wait=True, cancel_futures=True)
+            executor.shutdown(wait=False, cancel_futures=True)
+            for helper in set(multiprocessing.active_children()) - before:
+                helper.kill()
+                helper.join()
 
 
 def beside(function: Callable[[Item], Outcome], items: Iterable[Item]) -> Iterator[Outcome]:
@@ -77,33 +87,60 @@ def shared(function: Callable[[Item], Outcome], items: Sequence[Item]) -> Iterat
     """Outcomes of a function in the order of its items, by this process and its helpers.
 
     Args:
-        function: what to do; sent to the helpers, so that it may be no local function.
+        function: what to do; helpers get a copy, so that it may neither be a local function nor remember anything.
         items: with what.
     """
-    if HANDS.helpers is None or len(items) < 2:
+    order = _ordered(function) if HANDS.helpers is not None and len(items) > 1 else None
+    if order is None:
         yield from map(function, items)
         return
-    order = Path(HANDS.folder) / f"{len(os.listdir(HANDS.folder))}.pickle"
-    order.write_bytes(pickle.dumps(function, protocol=pickle.HIGHEST_PROTOCOL))
     waiting, sent = deque(range(len(items))), dict[int, Future[Any]]()
     for number, item in enumerate(items):
         # The far end is theirs, so that outcomes come in order from this one.
         while len(waiting) > 1 and sum(not f.done() for f in sent.values()) < AHEAD * HANDS.n_helpers:
             last = waiting.pop()
-            sent[last] = HANDS.helpers.submit(_piece, str(order), items[last])
+            sent[last] = _sent(_piece, order, items[last])
         if number in sent:
-            yield _received(sent[number], function, item)
+            yield _received(sent[number], partial(function, item))
         else:
             waiting.popleft()
             yield _alone(function, item)
 
 
-def _received(outcome: Future[Outcome], function: Callable[[Item], Outcome], item: Item) -> Outcome:
-    """What a helper made of an item, or this process where the helper is gone."""
+def meanwhile(function: Callable[..., Outcome], *arguments: Any, **options: Any) -> Callable[[], Outcome]:
+    """How to get the outcome of a call that a helper makes while this process goes on; made when asked for where none helps."""
+    here = partial(function, *arguments, **options)
+    if HANDS.helpers is None:
+        return here
+    return partial(_received, _sent(function, *arguments, **options), here)
+
+
+def _ordered(function: Callable[[Any], Any]) -> str | None:
+    """The file that tells helpers what to do; None where it cannot be told."""
     try:
-        return outcome.result()
-    except BrokenExecutor:
-        return function(item)
+        told = pickle.dumps(function, protocol=pickle.HIGHEST_PROTOCOL)
+    except (pickle.PicklingError, TypeError, AttributeError):
+        return None
+    handle, path = tempfile.mkstemp(dir=HANDS.folder)
+    with os.fdopen(handle, "wb") as file:
+        file.write(told)
+    return path
+
+
+def _sent(function: Callable[..., Any], *arguments: Any, **options: Any) -> Future[Any]:
+    """The outcome to come; a failed one where no helper is left."""
+    assert HANDS.helpers is not None
+    try:
+        return HANDS.helpers.submit(function, *arguments, **options)
+    except RuntimeError as error:
+        lost: Future[Any] = Future()
+        lost.set_exception(error)
+        return lost
+
+
+def _received(outcome: Future[Outcome], here: Callable[[], Outcome]) -> Outcome:
+    """What a helper found; found here where it did not get there, so that every error is met in this process."""
+    return here() if outcome.exception() is not None else outcome.result()
 
 
 def _alone(function: Callable[[Item], Outcome], item: Item) -> Outcome:
@@ -119,18 +156,17 @@ def _begin() -> None:
     HANDS.alone = True
 
 
-def _begun() -> None:
-    """Loads what a helper will need."""
-    from lab import kernel as kernel
-    from lab.diagnosis import diagnose as diagnose
-
-
-@lru_cache(maxsize=1)
-def _ordered(path: str) -> Callable[[Any], Any]:
-    """What is to be done; the same for many items."""
-    found: Callable[[Any], Any] = pickle.loads(Path(path).read_bytes())
-    return found
+def _load(modules: Sequence[str]) -> None:
+    for module in modules:
+        importlib.import_module(module)
 
 
 def _piece(path: str, item: Any) -> Any:
-    return _ordered(path)(item)
+    return _told(path)(item)
+
+
+@lru_cache(maxsize=1)
+def _told(path: str) -> Callable[[Any], Any]:
+    """What is to be done; the same for many items."""
+    found: Callable[[Any], Any] = pickle.loads(Path(path).read_bytes())
+    return found

@@ -8,7 +8,6 @@ from pathlib import Path
 
 import click
 
-from lab.aside import Aside
 from lab.cli.completion import names_of
 from lab.cli.progress import Bar
 from lab.cli.shared import (
@@ -24,8 +23,8 @@ from lab.cli.shared import (
     typed,
 )
 
-ASIDE = 2**16, 2**28
-"""Sizes of recordings [bytes] whose report is drawn aside: diagnosed not before a second process is up, and quickly copied."""
+LONG = 2**16
+"""Size of a recording [bytes] that takes longer than processes to get ready to help."""
 
 
 @click.command(
@@ -75,8 +74,8 @@ def command(
     MODEL.xml is a file, or a name from `lab list models`.
     """
     folder = out or Path("out") / f"{name_of_recording(recording)}_diagnosis"
-    with Bar(quiet) as progress, _report_aside(recording) as aside:
-        # The second process loads what it needs while this one does.
+    with Bar(quiet) as progress, _helped(recording):
+        # Others load what they need while this process does.
         from lab.diagnose_files import diagnose_file
         from lab.diagnosis_summary import diagnosis_summary
         from lab.files.diagnosis import diagnosis_document
@@ -93,14 +92,15 @@ def command(
             force=force,
             command=typed(),
             progress=progress,
-            aside=aside,
         )
     document, text = partial(diagnosis_document, diagnosis), partial(diagnosis_summary, diagnosis, known)
     print_outcome(document, text, diagnosis.warnings, folder, as_json, quiet)
 
 
-def _report_aside(recording: Path) -> AbstractContextManager[Aside | None]:
-    """A second process that draws the report, where it pays."""
-    size = recording.stat().st_size if recording.is_file() else 0
-    pays = ASIDE[0] <= size <= ASIDE[1]
-    return Aside("lab.show.diagnosis_report", "write_diagnosis_report") if pays else nullcontext()
+def _helped(recording: Path) -> AbstractContextManager[None]:
+    """Processes that help with the search and draw the report, where they pay."""
+    if not recording.is_file() or recording.stat().st_size < LONG:
+        return nullcontext()
+    from lab.hands import helped
+
+    return helped("lab.diagnosis.diagnose", "lab.kernel", "lab.show.diagnosis_report")

@@ -104,13 +104,13 @@ def test_the_command_tells_it_on_one_screen(engine, bench, capsys):
 
 
 @pytest.mark.slow
-def test_the_report_of_a_long_recording_is_drawn_aside_and_is_the_same(engine, bench, monkeypatch):
+def test_the_report_of_a_long_recording_is_drawn_by_a_helper_and_is_the_same(engine, bench, monkeypatch):
     asked = (*ASKED, "--out", "out", "--quiet", "--force")
     assert status(*asked) == 0
     here = Path("out/report.html").read_bytes()
-    monkeypatch.setattr("lab.aside._cores", lambda: 2)
-    monkeypatch.setattr(sys.modules["lab.cli.diagnose"], "ASIDE", (0, 2**20))
-    monkeypatch.setattr("lab.diagnose_files._write_report", None)  # nobody else may draw
+    monkeypatch.setattr("lab.hands.cores", lambda: 2)
+    monkeypatch.setattr(sys.modules["lab.cli.diagnose"], "LONG", 0)
+    monkeypatch.setattr("lab.show.diagnosis_report.write_diagnosis_report", None)  # nobody else may draw
     assert status(*asked) == 0
     assert sorted(os.listdir("out")) == OUTPUTS
     assert Path("out/report.html").read_bytes() == here
