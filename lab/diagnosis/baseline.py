@@ -6,7 +6,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, replace
 
 import numpy as np
-import scipy.stats
+import scipy.special
 
 from identification.recording import Array
 from lab.diagnosis.calibrate import Calibration
@@ -61,7 +61,7 @@ class Baseline:
         """
         power = _power(misfit, found)
         samples = max(found.residual.shape[1] / self.colour, 1.0)
-        limit = scipy.stats.f.isf(LEVEL / power.size, samples, max(self.samples, 1.0))
+        limit = scipy.special.fdtri(samples, max(self.samples, 1.0), 1 - LEVEL / power.size)
         return bool(np.all(power <= limit * self.power))
 
     def shows(self, cause: Hypothesis, gain: float, samples: float) -> bool:

@@ -5,7 +5,7 @@ from __future__ import annotations
 from functools import cached_property
 
 import numpy as np
-import scipy.stats
+import scipy.special
 
 from identification.recording import Array
 
@@ -73,5 +73,5 @@ def quantile(best: Array, own: int) -> float:
         return float(max(of_causes, 0.0))
     # The likelihood ratio of one outlier among n + 1 normal numbers whose spread is unknown is (n + 1) log(1 + t² / n). What is
     # believed of the spread beforehand, a factor of two either way, counts as about one of them.
-    t_squared = scipy.stats.f.isf(LEVEL / own, 1, own)
+    t_squared = scipy.special.fdtri(1, own, 1 - LEVEL / own)
     return float(max(of_causes, (own + 1) * np.log1p(t_squared / own), 0.0))

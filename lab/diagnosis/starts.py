@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import replace
 
 import numpy as np
-import scipy.stats
+import scipy.special
 
 from identification.recording import Array, Recording
 from lab.diagnosis.fit import Fit, weights
@@ -60,7 +60,7 @@ def moving(misfit: Misfit, fit: Fit) -> tuple[int, ...]:
             match = swing @ e[:, instant : instant + length].ravel()
             falls.append(match @ inverse @ match)
         dispersion = max(np.mean(falls[1:]) / swing.shape[0], 1.0)
-        if falls[0] > dispersion * scipy.stats.chi2.isf(LEVEL, swing.shape[0]):
+        if falls[0] > dispersion * scipy.special.chdtri(swing.shape[0], LEVEL):
             found.append(number)
     return tuple(found)
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-import scipy.stats
+import scipy.special
 
 from identification.recording import Array
 
@@ -84,7 +84,7 @@ def whiteness(residual: Array, inputs: Array) -> Whiteness:
         len(u), LAGS, len(e)
     )
     tests = own.size + cross.size
-    limit = float(scipy.stats.norm.isf(LEVEL / (2 * max(tests, 1))))
+    limit = -float(scipy.special.ndtri(LEVEL / (2 * max(tests, 1))))
     k, i = np.unravel_index(np.argmax(np.abs(own)), own.shape)
     shares = _predictable(e, u)
     told = (

@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 
 import numpy as np
-import scipy.stats
+import scipy.special
 
 from identification.recording import Array
 from lab.diagnosis.colour import colour
@@ -50,7 +50,7 @@ class Lesson:
         """
         power = _power(likelihood, predicted)
         n = 2 * len(likelihood.values) / self.colour
-        limit = scipy.stats.f.isf(LEVEL / power.size, n, 2 * self.lines)
+        limit = scipy.special.fdtri(n, 2 * self.lines, 1 - LEVEL / power.size)
         # Where neither errs, neither errs more.
         ratio = np.where(power > 0, np.inf, 1.0)
         np.divide(power, self.power, out=ratio, where=self.power > 0)

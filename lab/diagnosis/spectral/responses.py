@@ -6,7 +6,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, replace
 
 import numpy as np
-import scipy.stats
+import scipy.special
 
 from identification.recording import Array
 from identification.response import FrequencyResponse
@@ -252,7 +252,7 @@ class Responses:
     def _too_large(self, e: Complex) -> str:
         n = e.shape[0]
         power = np.sum(2 * np.abs(e) ** 2, axis=0)
-        p = scipy.stats.chi2.sf(power, 2 * n)
+        p = scipy.special.chdtrc(2 * n, power)
         i, j = np.unravel_index(np.argmax(power), power.shape)
         if p[i, j] * p.size >= LEVEL:
             return ""
