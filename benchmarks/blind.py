@@ -20,7 +20,6 @@ import os
 import sys
 import tempfile
 import time
-from concurrent.futures import ProcessPoolExecutor
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
@@ -41,7 +40,9 @@ from lab.diagnosis.outcome import Diagnosis
 from lab.effects import EFFECTS
 from lab.errors import LabError
 from lab.files.recording import save
+from lab.hands import by_itself
 from lab.rig import Rig
+from lab.studies.workers import process_pool
 
 
 @dataclass(frozen=True)
@@ -126,7 +127,7 @@ def run(trials: list[Trial], path: Path, *, jobs: int, write: Path | None) -> No
     known = {json.dumps({name: row[name] for name in vars(Trial("", 0))}) for row in read(path)}
     todo = [trial for trial in trials if json.dumps(trial.key) not in known]
     places = [write] * len(todo)
-    with path.open("a", encoding="utf-8") as file, ProcessPoolExecutor(jobs) as pool:
+    with path.open("a", encoding="utf-8") as file, process_pool(jobs, by_itself) as pool:
         rows = map(answered, todo, places) if jobs == 1 else pool.map(answered, todo, places)
         for number, row in enumerate(rows, start=1):
             file.write(json.dumps(row) + "\n")

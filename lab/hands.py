@@ -64,7 +64,7 @@ def helped(*modules: str, n: int | None = None) -> Iterator[None]:
         return
     before = set(multiprocessing.active_children())
     with tempfile.TemporaryDirectory(prefix="lab-") as folder:
-        executor = process_pool(n, _begin)
+        executor = process_pool(n, by_itself)
         for _ in range(n):
             executor.submit(_load, modules)
         HANDS.helpers, HANDS.n_helpers, HANDS.folder = executor, n, folder
@@ -152,7 +152,8 @@ def _alone(function: Callable[[Item], Outcome], item: Item) -> Outcome:
         HANDS.alone = False
 
 
-def _begin() -> None:
+def by_itself() -> None:
+    """Makes this process one of several that have the cores between them."""
     HANDS.alone = True
 
 
