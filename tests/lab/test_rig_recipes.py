@@ -32,6 +32,7 @@ MODELS = {
     "ecp_carts/three_carts.toml": "ecp_carts/three_carts.xml",
     "silverbox/snls80mv.toml": "silverbox/silverbox.xml",
     "beam_masses/response.toml": "beam_masses/beam.xml",
+    "friction_damper/imposed.toml": "friction_damper/imposed.xml",
     "unison_tower/wn.toml": "unison_tower/tower.xml",
     "lumo_tower/acceleration.toml": "lumo_tower/tower.xml",
 }
