@@ -10,10 +10,12 @@ import scipy.optimize
 import lab
 from benchmarks import real_rigs
 from benchmarks.rigs import beam, ecp, friction_damper, silverbox, towers
-from benchmarks.rigs.row import DATA, RIGS, Row
+from benchmarks.rigs.row import DATA, RIGS, Row, measured
+from identification.identify import identify
 from identification.recording import Record, Recording
 from lab.effects import EFFECTS
 from lab.files.recipe import load_recipe
+from lab.matching import placed
 from lab.replay import replay
 
 needs_data = pytest.mark.skipif(not DATA.is_dir(), reason="the recordings are not part of the project")
@@ -139,6 +141,22 @@ def test_the_check_finds_the_odd_order_and_the_turned_floor():
 @pytest.mark.slow
 def test_the_tower_has_the_modes_that_its_authors_look_for():
     assert "in 5 of the five bands" in next(towers.unison()).says
+
+
+@needs_data
+def test_the_lattice_tower_sways_as_its_model_on_which_it_is_shown():
+    rig = lab.Rig.load(RIGS / "lumo_tower" / "tower.xml")
+    recording = measured("lumo_tower/data_lumo.csv.gz", "lumo_tower/acceleration.toml")
+    found = identify(placed(towers.ambient(recording, step=towers.DECIMATED), rig), uncertainty=False).modes
+    assert [channel.dof for channel in found.outputs] == [c.name.replace(".", "_") for c in found.outputs]
+    model = rig.second_order().modes()
+    rows = [[c.dof for c in model.outputs].index(channel.dof) for channel in found.outputs]
+    assert found.frequency_hz[:2] == pytest.approx([2.79, 2.79], rel=0.02)
+    # Both lowest modes of the model have one frequency, so that any mix of them is one: the share of the measured shape
+    # that they span. What the mast of the model, even all along, lacks of the tower's own curve is no more than a few per cent.
+    basis = np.linalg.qr(model.shapes[rows, :2])[0]
+    for shape in (found.shapes[:, k] / np.linalg.norm(found.shapes[:, k]) for k in (0, 1)):
+        assert np.linalg.norm(basis.conj().T @ shape) ** 2 > 0.97
 
 
 @needs_data
