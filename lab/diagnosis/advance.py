@@ -8,7 +8,7 @@ from dataclasses import replace
 from lab.diagnosis.calibrate import Calibration, survey_of
 from lab.diagnosis.candidate import Candidate
 from lab.diagnosis.evidence import minus_two_log_evidence
-from lab.diagnosis.fit import Fit, fit
+from lab.diagnosis.fit import Fit, fit, resumed
 from lab.diagnosis.gain import held_out_error
 from lab.diagnosis.revise import renamed, restarted
 from lab.diagnosis.state import State
@@ -26,15 +26,7 @@ def with_cause(state: State, candidate: Candidate, rig: Rig) -> State:
     misfit, found = state.misfit, candidate.fit
     if candidate.direction is not None:
         misfit = replace(misfit, parameters=misfit.parameters.lifted(candidate.direction))
-    refit = fit(
-        misfit,
-        found.theta,
-        found.causes,
-        observer=found.observer,
-        iterations=15,
-        refresh=2,
-        tolerance=0.1,
-    )
+    refit = resumed(misfit, found, iterations=15, tolerance=0.1)
     misfit = replace(misfit, survey=survey_of(misfit, rig, refit.theta, refit.residual))
     if misfit.plant(refit.theta, refit.causes).laws:
         misfit = replace(misfit, substeps=LAW_SUBSTEPS)
@@ -83,8 +75,7 @@ def finely(state: State) -> State:
     if not any(state.misfit.plant(state.fit.theta, state.fit.causes).laws):
         return state
     misfit = replace(state.misfit, substeps=FINE_SUBSTEPS)
-    found = state.fit
-    refit = fit(misfit, found.theta, found.causes, observer=found.observer, iterations=3, tolerance=0.5)
+    refit = resumed(misfit, state.fit, iterations=3)
     return replace(state, fit=refit, calibration=replace(state.calibration, misfit=misfit))
 
 

@@ -242,3 +242,16 @@ def fit(
                 break
             age = refresh
     return Fit(theta, causes, e, f, information, P, observer, misfit.parameters.n_structural)
+
+
+def resumed(misfit: Misfit, found: Fit, *, iterations: int, refresh: int = 2, tolerance: float = 0.5) -> Fit:
+    """A fit gone on with, perhaps of another misfit: with other priors, or finer substeps."""
+    return fit(
+        misfit,
+        found.theta,
+        found.causes,
+        observer=found.observer,
+        iterations=iterations,
+        refresh=refresh,
+        tolerance=tolerance,
+    )

@@ -41,8 +41,8 @@ def kalman_gain(misfit: Misfit, theta: Array, force_share: float, *, noise_share
     cross, noise = G @ Q @ D.T, R + D @ Q @ D.T
     P = scipy.linalg.solve_discrete_are(F.T, C.T, G @ Q @ G.T, noise, s=cross)
     K = (F @ P @ C.T + cross) @ np.linalg.inv(C @ P @ C.T + noise)
-    # The kernel corrects the state before it moves on.
-    gain = np.linalg.solve(F, K)
+    # The kernel corrects the state before it moves on; what is gone within a sample needs no correction.
+    gain = np.linalg.lstsq(F, K, rcond=None)[0]
     return np.ascontiguousarray(gain * x[:, None] / y)
 
 

@@ -5,11 +5,11 @@ from __future__ import annotations
 from collections.abc import Mapping
 
 from lab.diagnosis.evidence import minus_two_log_evidence
-from lab.diagnosis.fit import Fit, fit
+from lab.diagnosis.fit import Fit, resumed
 from lab.diagnosis.misfit import Misfit
 from lab.diagnosis.places import mends
+from lab.diagnosis.refits import leading, tried
 from lab.diagnosis.screening import hypotheses
-from lab.diagnosis.search import leading, tried
 from lab.effects.effect import Effect
 
 
@@ -50,7 +50,7 @@ def renamed(misfit: Misfit, found: Fit, number: int, effects: Mapping[str, type[
     ]
     best, evidence = found, minus_two_log_evidence(found)
     for trial in leading([f for f in trials if f is not None]):
-        polished = fit(misfit, trial.theta, trial.causes, observer=trial.observer, iterations=15, refresh=2)
+        polished = resumed(misfit, trial, iterations=15)
         own = minus_two_log_evidence(polished)
         if own < evidence:
             best, evidence = polished, own

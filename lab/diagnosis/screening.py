@@ -187,6 +187,9 @@ class Glance:
         if not (h.n and np.isfinite(start[4])):
             return (h, *start[4:]), NO_CHANCE
         own, follow = self._own_slopes(h, start[1])
+        if not np.all(np.isfinite(own)):
+            # A step to the side diverges: nothing is known of where to go from here.
+            return (h, *start[4:]), NO_CHANCE
         lucky = self.chance.tones if tone(h) is not None else self.chance.gains(own * self.weights[:, None])
         start = self._stepped(start, own, follow)
         return (start[0], *start[4:]), lucky

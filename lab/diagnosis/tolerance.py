@@ -11,7 +11,7 @@ import numpy as np
 from lab.diagnosis.candidate import Candidate
 from lab.diagnosis.changes import directions
 from lab.diagnosis.evidence import minus_two_log_evidence
-from lab.diagnosis.fit import Fit, fit
+from lab.diagnosis.fit import Fit, resumed
 from lab.diagnosis.misfit import Misfit
 from lab.diagnosis.places import mends
 from lab.effects.effect import EVERYWHERE, Effect
@@ -66,6 +66,5 @@ def confirmed(misfit: Misfit, without: float, candidate: Candidate) -> Candidate
     if candidate.beside is not None:
         parameters, shared = parameters.lifted(candidate.beside), 0.5
     changed = replace(misfit, parameters=parameters)
-    found = candidate.fit
-    refit = fit(changed, found.theta, found.causes, observer=found.observer, iterations=20, tolerance=0.1)
+    refit = resumed(changed, candidate.fit, iterations=20, tolerance=0.1)
     return replace(candidate, fit=refit, gain=shared * (without - minus_two_log_evidence(refit)))
