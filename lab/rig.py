@@ -232,7 +232,7 @@ class Rig:
     @cached_property
     def linear(self) -> bool:
         """Whether the structure is linear as written, for motion of any size."""
-        return self.smooth and self._straight
+        return self.smooth and self.straight
 
     @cached_property
     def smooth(self) -> bool:
@@ -240,7 +240,8 @@ class Rig:
         return tangent.is_smooth(self.model)
 
     @cached_property
-    def _straight(self) -> bool:
+    def straight(self) -> bool:
+        """Whether, kinks aside, forces and readings are linear in the motion at any amplitude."""
         return tangent.is_straight(self.model)
 
     @cached_property
@@ -257,12 +258,12 @@ class Rig:
 
     @cached_property
     def _second_order(self) -> SecondOrder:
-        M, C_d, K = linearize.matrices(self._tangent, self.operating_point, analytic=self._straight)
+        M, C_d, K = linearize.matrices(self._tangent, self.operating_point, analytic=self.straight)
         return SecondOrder(M, C_d, K, self.dofs)
 
     @cached_property
     def _linearized(self) -> tuple[Array, Array, Array, Array]:
-        return linearize.state_space(self._tangent, self.operating_point, exact=self._straight)
+        return linearize.state_space(self._tangent, self.operating_point, exact=self.straight)
 
     @cached_property
     def _everything(self) -> StateSpace:

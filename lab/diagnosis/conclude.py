@@ -120,15 +120,12 @@ def conclude(
     """
     causes = effects_of(state)
     calibrated = calibrated_rig(state.misfit, state.origin.theta, rig)
-    extended = calibrated_rig(state.misfit, state.fit.theta, rig)
-    for candidate, effect, _ in causes:
-        if candidate.direction is None:
-            extended = effect.apply(extended)
+    extended = extended_rig(state, rig)
     misfit = state.misfit
     floor = noise_floor(state.fit.residual, held_out(misfit))
     starts = [best_starts(misfit), starts_of(misfit, state.origin.theta), starts_of(misfit, state.fit.theta)]
     predictions = predictions_of(
-        recording, misfit, (nominal, calibrated, extended), starts, accuracy=max(0.2 * floor, 1e-6), work=work
+        recording, misfit, (nominal, calibrated, extended), starts, accuracy=accuracy_of(state), work=work
     )
     shares = _shares(state, floor)
     findings = [
@@ -161,6 +158,20 @@ def conclude(
         noise=noise_of(state.fit.residual, recording),
         unlearnable=(*check(recording, nominal), *unlearnable(state.misfit, state.fit)),
     )
+
+
+def extended_rig(state: State, rig: Rig) -> Rig:
+    """The rig with its parameters as fitted, and with the causes so far."""
+    extended = calibrated_rig(state.misfit, state.fit.theta, rig)
+    for candidate, effect, _ in effects_of(state):
+        if candidate.direction is None:
+            extended = effect.apply(extended)
+    return extended
+
+
+def accuracy_of(state: State) -> float:
+    """Relative error of a simulation that noise hides."""
+    return max(0.2 * noise_floor(state.fit.residual, held_out(state.misfit)), 1e-6)
 
 
 def _shares(state: State, floor: float) -> list[float]:

@@ -19,6 +19,7 @@ from lab.diagnosis.advance import (
     without_idle,
 )
 from lab.diagnosis.baseline import Baseline
+from lab.diagnosis.bending import bent
 from lab.diagnosis.calibrate import calibrate, parameters_of
 from lab.diagnosis.candidate import Candidate
 from lab.diagnosis.changes import OWN_CHANGES
@@ -91,6 +92,9 @@ def diagnose(
     refused: Candidate | None = None
     fine: State | None = None
     left = whiteness(state.fit.residual, inputs)
+    if not left.white:
+        state = bent(state, recording, rig)
+        left = whiteness(state.fit.residual, inputs)
     while len(state.accepted) < MOST_FINDINGS:
         if state.accepted:
             searching, accepting, concluding = Work(progress).parts(*COSTS[1:])
@@ -114,7 +118,7 @@ def diagnose(
         covered = known is not None and known.covers(fitted.misfit, fitted.fit)
         after = whiteness(fitted.fit.residual, inputs)
         if not after.white:
-            further = with_better_names(tried_again(further), effects)
+            further = bent(with_better_names(tried_again(further), effects), recording, rig)
             fitted = finely(further)
             after = whiteness(fitted.fit.residual, inputs)
         if state.accepted and not covered and patches(left, after):

@@ -194,6 +194,7 @@ class Misfit:
         n_train: samples at the start of each record that fits may see.
         substeps: of the kernel.
         colour: samples that count as one, since the model errs alike for a while.
+        bend: what the structure does beyond the twin, (n_outputs, n) for each record; nothing where empty.
     """
 
     twin: Twin
@@ -204,6 +205,7 @@ class Misfit:
     survey: Survey | None = None
     substeps: int = 6
     colour: float = 1.0
+    bend: tuple[Array, ...] = ()
 
     @classmethod
     def of(cls, recording: Recording, twin: Twin, parameters: Parameters, *, share: float = 0.7) -> Misfit:
@@ -260,6 +262,8 @@ class Misfit:
         observer = _widened(observer, plant, self.twin.plant.n_dofs, responder.matrices[0].shape[0])
         parts = []
         for number, ((u, y), n) in enumerate(zip(self.records, n_train or self.n_train, strict=True)):
+            if self.bend:
+                y = y - self.bend[number]
             start = self.parameters.start(theta, number)
             if start is not None:
                 start = _widened(start[:, None], plant, self.twin.plant.n_dofs, 2 * plant.n_dofs)[:, 0]

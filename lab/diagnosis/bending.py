@@ -1,0 +1,67 @@
+"""Bending: what a structure does beyond its tangent, such as bars that turn as they move: MuJoCo has it, the fast twin not."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+
+from identification.recording import Recording
+from lab.diagnosis.conclude import accuracy_of, extended_rig
+from lab.diagnosis.fit import resumed
+from lab.diagnosis.gain import held_out_error
+from lab.diagnosis.starts import start_of, starts_of
+from lab.diagnosis.state import State
+from lab.errors import LabError
+from lab.replay import replay
+from lab.rig import Rig
+
+SHOWN = 30.0
+"""-2 log posterior by which a fit must fall for the bending to be taken for real."""
+
+
+def bent(state: State, recording: Recording, rig: Rig) -> State:
+    """The state with what its model does beyond its tangent added to the twin, where the data show it.
+
+    Both the twin and MuJoCo are driven by the measured inputs. By what they differ changes little when parameters do, so that
+    fits go on with the twin.
+
+    Args:
+        state: with the causes so far.
+        recording: measured.
+        rig: what was calibrated.
+    """
+    if rig.straight:
+        return state
+    misfit, found = state.misfit, state.fit
+    model = extended_rig(state, rig)
+    starts = [
+        None if start is None else start_of(model, rig.dofs, start)
+        for start in starts_of(misfit, found.theta)
+    ]
+    try:
+        outputs = replay(model, recording, accuracy=accuracy_of(state), starts=starts)
+    except LabError:
+        return state
+    whole = tuple(y.shape[1] for _, y in misfit.records)
+    tangent = replace(misfit, bend=())
+    e = tangent.residual(found.theta, found.causes, n_train=whole)
+    ends = np.cumsum(whole)[:-1]
+    bend = tuple(
+        real - (np.nan_to_num(y) - part)
+        for real, (_, y), part in zip(outputs, misfit.records, np.split(e, ends, axis=1), strict=True)
+    )
+    misfit = replace(misfit, bend=bend)
+    fit = resumed(misfit, found, iterations=15, tolerance=0.1)
+    if not fit.objective < found.objective - SHOWN:
+        return state
+    guided = fit if state.accepted else resumed(misfit, state.calibration.guided, iterations=5)
+    calibration = replace(state.calibration, misfit=misfit, fit=fit, guided=guided)
+    held_out = (*state.held_out[:-1], held_out_error(misfit, fit))
+    return replace(
+        state,
+        calibration=calibration,
+        fit=fit,
+        held_out=held_out,
+        origin=state.origin if state.accepted else fit,
+    )
