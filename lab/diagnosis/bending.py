@@ -9,7 +9,7 @@ import numpy as np
 from identification.recording import Recording
 from lab.diagnosis.conclude import accuracy_of, extended_rig
 from lab.diagnosis.fit import resumed
-from lab.diagnosis.gain import held_out_error
+from lab.diagnosis.gain import held_out_error, predicted
 from lab.diagnosis.starts import start_of, starts_of
 from lab.diagnosis.state import State
 from lab.errors import LabError
@@ -43,14 +43,8 @@ def bent(state: State, recording: Recording, rig: Rig) -> State:
         outputs = replay(model, recording, accuracy=accuracy_of(state), starts=starts)
     except LabError:
         return state
-    whole = tuple(y.shape[1] for _, y in misfit.records)
-    tangent = replace(misfit, bend=())
-    e = tangent.residual(found.theta, found.causes, n_train=whole)
-    ends = np.cumsum(whole)[:-1]
-    bend = tuple(
-        real - (np.nan_to_num(y) - part)
-        for real, (_, y), part in zip(outputs, misfit.records, np.split(e, ends, axis=1), strict=True)
-    )
+    tangent = predicted(replace(misfit, bend=()), found)
+    bend = tuple(np.nan_to_num(real - own) for real, own in zip(outputs, tangent, strict=True))
     misfit = replace(misfit, bend=bend)
     fit = resumed(misfit, found, iterations=15, tolerance=0.1)
     if not fit.objective < found.objective - SHOWN:

@@ -13,7 +13,7 @@ from lab.diagnosis import words
 from lab.diagnosis.baseline import Baseline
 from lab.diagnosis.candidate import Candidate
 from lab.diagnosis.check import check
-from lab.diagnosis.gain import errors_of, held_out, noise_floor, predictions_of
+from lab.diagnosis.gain import errors_of, held_out, noise_floor, predicted, predictions_of
 from lab.diagnosis.misfit import Misfit
 from lab.diagnosis.noise import noise_of
 from lab.diagnosis.outcome import (
@@ -125,7 +125,13 @@ def conclude(
     floor = noise_floor(state.fit.residual, held_out(misfit))
     starts = [best_starts(misfit), starts_of(misfit, state.origin.theta), starts_of(misfit, state.fit.theta)]
     predictions = predictions_of(
-        recording, misfit, (nominal, calibrated, extended), starts, accuracy=accuracy_of(state), work=work
+        recording,
+        misfit,
+        (nominal, calibrated, extended),
+        starts,
+        expected=predicted(misfit, state.fit),
+        accuracy=accuracy_of(state),
+        work=work,
     )
     shares = _shares(state, floor)
     findings = [

@@ -27,6 +27,7 @@ def predictions_of(
     rigs: Sequence[Rig],
     starts: Sequence[Sequence[Array | None]],
     *,
+    expected: Sequence[Array],
     accuracy: float,
     work: Work = UNHEARD,
 ) -> tuple[Prediction, ...]:
@@ -37,12 +38,14 @@ def predictions_of(
         misfit: of the nominal rig.
         rigs: nominal, calibrated, extended.
         starts: for each of them, the motion at the start of each record, as the nominal rig has it.
+        expected: outputs of the extended rig by the fast twin, one array per record.
         accuracy: of the simulation.
         work: told of every rig.
     """
     # Never in two threads: MuJoCo's callbacks belong to the whole process.
     simulated = shared(
-        partial(_simulated, recording, rigs[0].dofs, accuracy), list(zip(rigs, starts, strict=True))
+        partial(_simulated, recording, rigs[0].dofs, accuracy),
+        list(zip(rigs, starts, (None, None, expected), strict=True)),
     )
     return tuple(
         Prediction(measured, nominal, calibrated, extended, first)
@@ -56,12 +59,12 @@ def _simulated(
     recording: Recording,
     dofs: tuple[str, ...],
     accuracy: float,
-    driven: tuple[Rig, Sequence[Array | None]],
+    driven: tuple[Rig, Sequence[Array | None], Sequence[Array] | None],
 ) -> list[Array]:
-    """Outputs of a rig that starts each record as told in terms of `dofs`, by MuJoCo."""
-    rig, begins = driven
+    """Outputs of a rig that starts each record as told in terms of `dofs`, by MuJoCo; the last are those expected."""
+    rig, begins, expected = driven
     motions = [None if start is None else start_of(rig, dofs, start) for start in begins]
-    return replay(rig, recording, accuracy=accuracy, starts=motions)
+    return replay(rig, recording, accuracy=accuracy, starts=motions, expected=expected)
 
 
 def errors_of(predictions: Sequence[Prediction], floor: float) -> Errors:
@@ -87,16 +90,23 @@ def relative_error(pairs: Sequence[tuple[Array, Array]]) -> float:
     return float(np.sqrt(np.mean(power / np.where(signal > 0, signal, 1.0))))
 
 
-def held_out_error(misfit: Misfit, found: Fit) -> float:
-    """The same of a fit, by the fast twin."""
+def predicted(misfit: Misfit, found: Fit) -> list[Array]:
+    """Whole outputs of every record by the fast twin, (n_outputs, n_samples) each; missing where the measured ones are."""
     whole = tuple(y.shape[1] for _, y in misfit.records)
     e = misfit.residual(found.theta, found.causes, n_train=whole)
-    pairs, first = [], 0
-    for (_, y), n in zip(misfit.records, misfit.n_train, strict=True):
-        part = e[:, first : first + y.shape[1]]
-        pairs.append((y[:, n:], y[:, n:] - part[:, n:]))
-        first += y.shape[1]
-    return relative_error(pairs)
+    parts = np.split(e, np.cumsum(whole)[:-1], axis=1)
+    return [y - part for (_, y), part in zip(misfit.records, parts, strict=True)]
+
+
+def held_out_error(misfit: Misfit, found: Fit) -> float:
+    """The same of a fit, by the fast twin."""
+    outputs = predicted(misfit, found)
+    return relative_error(
+        [
+            (y[:, n:], own[:, n:])
+            for (_, y), own, n in zip(misfit.records, outputs, misfit.n_train, strict=True)
+        ]
+    )
 
 
 def held_out(misfit: Misfit) -> Array:
