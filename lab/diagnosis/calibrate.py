@@ -138,9 +138,10 @@ def survey_of(misfit: Misfit, rig: Rig, theta: Array, residual: Array | None = N
         v @ v.T / v.shape[1],
         np.sqrt(np.mean((plant.mass @ a) ** 2, axis=1)),
         np.sqrt(np.nanmean(outputs**2, axis=1)),
-        np.nanmax(np.abs(outputs), axis=1),
+        # Peaks that fits see: a limit beyond them would do nothing.
+        np.nanmax(np.abs(misfit.measured), axis=1),
         np.sqrt(np.nanmean(inputs**2, axis=1)),
-        np.nanmax(np.abs(inputs), axis=1, initial=0.0),
+        np.nanmax(np.abs(misfit.driven), axis=1, initial=0.0),
         tuple(peaks[0]),
         tuple(peaks[1]),
         misfit.dt,

@@ -20,8 +20,10 @@ from lab.hands import beside, shared
 SCREEN_SAMPLES = 4096
 SCREEN_SUBSTEPS = 3
 """Enough to rank causes by, where nothing else in the model has a law."""
-STEPPED_ON = 40
-"""Hypotheses that get more than one step in the screening."""
+STEPPED_ON, PLACES = 40, 8
+"""Hypotheses that get more than one step in the screening; and places at which each cause does that begins at some size: it may
+begin far off, and would not show beside causes that begin at none."""
+MOST_STEPS = 4
 AT_ONCE = 16
 """Hypotheses that are looked at in one piece of work."""
 SCREEN_VALUES = 32768
@@ -85,6 +87,7 @@ def screen(
     work: Work = UNHEARD,
     *,
     share: float = 1.0,
+    places: int = PLACES,
 ) -> Screening:
     """Every hypothesis tried cheaply beside the causes present, and what the luckiest would have gained from noise.
 
@@ -96,22 +99,42 @@ def screen(
         proposed: causes to try.
         work: told of every hypothesis.
         share: of the samples that are usually looked at.
+        places: where each cause that begins at some size is followed, besides the best of all.
     """
     most = int(share * min(SCREEN_SAMPLES, SCREEN_VALUES // misfit.measured.shape[0]))
     n_train = tuple(min(n, most) for n in misfit.n_train)
     if not misfit.plant(theta, present).laws:
         misfit = replace(misfit, substeps=SCREEN_SUBSTEPS)
     glance = Glance.beside(misfit, theta, tuple(present), observer, n_train)
-    looking, following = work.parts(len(proposed), STEPPED_ON)
+    looking, following = work.parts(len(proposed), 2 * STEPPED_ON)
     pieces = [proposed[i : i + AT_ONCE] for i in range(0, len(proposed), AT_ONCE)]
     looks = [look for some in looking.each(shared(glance.looks, pieces), len(pieces)) for look in some]
     lucky = np.max([NO_CHANCE, *(each for _, each in looks)], axis=0)
     first = sorted((look for look, _ in looks), key=lambda look: -glance.score(look))
-    pieces_again = [first[i : i + AT_ONCE // 4] for i in range(0, min(STEPPED_ON, len(first)), AT_ONCE // 4)]
-    followed = following.each(shared(glance.followed, pieces_again), len(pieces_again))
+    chosen = _to_follow(first, places)
+    few = [chosen[i : i + AT_ONCE // 4] for i in range(0, len(chosen), AT_ONCE // 4)]
+    followed = following.each(shared(glance.followed, few), len(few))
     again = [look for some in followed for look in some]
-    rows = [Screened(look[0], theta, glance.score(look)) for look in again + first[STEPPED_ON:]]
+    known = {id(look) for look in chosen}
+    rows = [
+        Screened(look[0], theta, glance.score(look))
+        for look in again + [look for look in first if id(look) not in known]
+    ]
     return Screening(sorted(rows, key=lambda row: -row.score), lucky, glance.base)
+
+
+def _to_follow(looks: Sequence[_Look], places: int) -> list[_Look]:
+    """The best of all, and the best of those that begin at some size at their places, of looks by falling score."""
+    followed: dict[str, set[str]] = {}
+    chosen = []
+    for number, look in enumerate(looks):
+        h = look[0]
+        known = followed.setdefault(h.kind.cause, set())
+        sized = any(h.guess.start.values()) and h.location not in known and len(known) < places
+        if number < STEPPED_ON or sized:
+            chosen.append(look)
+            known.add(h.location)
+    return chosen
 
 
 @dataclass(frozen=True, eq=False)
@@ -199,7 +222,7 @@ class Glance:
         if not (h.n and np.isfinite(f)):
             return look
         start = self._started(h, damping)
-        for _ in range(3):
+        for _ in range(MOST_STEPS):
             before = start[4]
             start = self._stepped(start, *self._own_slopes(start[0], start[1]))
             if before - start[4] < 1:

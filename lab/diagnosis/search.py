@@ -58,7 +58,9 @@ def search(
     screened = screen(misfit, first, causes, observer, proposed, near, share=0.5 if others else 1.0)
     for nominal in others:
         observer = kalman_gain(misfit, nominal, calibration.share) if observer.size else observer
-        screened = screened.beside(screen(misfit, nominal, causes, observer, proposed, far, share=0.5))
+        # What shows from here only is large, and among the best of all.
+        other = screen(misfit, nominal, causes, observer, proposed, far, share=0.5, places=0)
+        screened = screened.beside(other)
     without = minus_two_log_evidence(present)
     own_and_named = {**OWN_CHANGES, **effects}
     refits = refitted(calibration, present, _picked(screened.rows), refitting)

@@ -36,4 +36,6 @@ class ActuatorSaturation(AtInput, Effect):
     @classmethod
     def guesses(cls, survey: Survey, location: str) -> list[Guess]:
         peak, rms = survey.input_peak[survey.input(location)], survey.input_rms[survey.input(location)]
-        return [Guess({"limit": limit}, {"limit": rms}) for limit in (0.97 * peak, 1.5 * rms)]
+        # A limit that clips nothing has no slope, and one that clips all leads nowhere.
+        limits = (0.97 * peak, 0.8 * peak, 0.6 * peak, 1.5 * rms)
+        return [Guess({"limit": limit}, {"limit": rms}) for limit in limits]

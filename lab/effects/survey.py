@@ -39,7 +39,7 @@ class Survey:
         speed_covariance: of velocities, (n_dofs, n_dofs) [m^2/s^2].
         force_rms: RMS inertia force on each degree of freedom [N].
         output_rms, output_peak: of each recorded output.
-        input_rms, input_peak: of each recorded input.
+        input_rms, input_peak: of each recorded input; peaks are those that fits see.
         tones: for each output, frequencies [Hz] at which the residual stands out.
         common_tones: frequencies at which all residuals stand out together.
         dt: sample time [s].
