@@ -34,7 +34,7 @@ from lab.diagnosis.search import search
 from lab.diagnosis.starts import free_decays, with_starts
 from lab.diagnosis.state import State
 from lab.diagnosis.tolerance import wrong_parameters
-from lab.diagnosis.whiteness import patches, whiteness
+from lab.diagnosis.whiteness import Whiteness, patches, whiteness
 from lab.diagnosis.words import FURTHER
 from lab.effects import EFFECTS
 from lab.effects.effect import Effect
@@ -87,14 +87,13 @@ def diagnose(
     calibration = calibrate(misfit, rig, calibrating.called("calibrating"))
     found = calibration.fit
     state = State(calibration, found, (), found, (held_out_error(calibration.misfit, found),))
-    inputs = misfit.driven
     first: list[Candidate] = []
     refused: Candidate | None = None
     fine: State | None = None
-    left = whiteness(state.fit.residual, inputs)
+    left = _left(state)
     if not left.white:
         state = bent(state, recording, rig)
-        left = whiteness(state.fit.residual, inputs)
+        left = _left(state)
     while len(state.accepted) < MOST_FINDINGS:
         if state.accepted:
             searching, accepting, concluding = Work(progress).parts(*COSTS[1:])
@@ -116,11 +115,11 @@ def diagnose(
         further = with_cause(state, candidates[0], rig)
         fitted = finely(further)
         covered = known is not None and known.covers(fitted.misfit, fitted.fit)
-        after = whiteness(fitted.fit.residual, inputs)
+        after = _left(fitted)
         if not after.white:
             further = bent(with_better_names(tried_again(further), effects), recording, rig)
             fitted = finely(further)
-            after = whiteness(fitted.fit.residual, inputs)
+            after = _left(fitted)
         if state.accepted and not covered and patches(left, after):
             break
         state, left, fine = further, after, fitted
@@ -128,9 +127,15 @@ def diagnose(
             break
     kept = without_idle(state)
     state = fine if fine is not None and kept is state else finely(kept)
-    left = whiteness(state.fit.residual, inputs)
+    left = _left(state)
     told = concluding.called("simulating what was found")
     return conclude(state, recording, nominal, rig, first, left, known, refused, told)
+
+
+def _left(state: State) -> Whiteness:
+    """What the fit so far leaves."""
+    residual = state.fit.residual
+    return whiteness(residual, state.misfit.driven, state.misfit.measured - residual)
 
 
 def _begun(

@@ -16,21 +16,23 @@ MATTERS = 0.05
 """Share of a residual's power that must be predictable for it to count: in a long record any two simulators differ
 significantly, and what is below a twentieth of the noise nobody would miss in a prediction."""
 
+POWERS = 2, 3
+"""Of the signal, that a residual is held against."""
 PATCHED = 0.5
 """Share of what was left that a cause must take to be more than a patch."""
 
 
 @dataclass(frozen=True)
 class Whiteness:
-    """Largest correlation of a residual with its own past and with the inputs, in standard deviations.
+    """Largest correlation of a residual with its own past, the inputs and powers of the signal, in standard deviations.
 
     Attributes:
         largest: of all correlations tested.
         limit: that white noise stays below, but for a probability of `LEVEL`.
         channel: output with the largest correlation.
         lag: in samples.
-        with_input: number of the input it correlates with; None for its own past.
-        share: of the residual's power that its past and the inputs predict, in the channel where that is most.
+        with_input: number of the input it correlates with; None for its own past or signal.
+        share: of the residual's power that past, inputs and signal predict, in the channel where that is most.
         left: information in what they predict, twice, over all channels [nat per sample].
         level: logarithm of the residual's mean square, summed over all channels.
     """
@@ -43,6 +45,8 @@ class Whiteness:
     share: float
     left: float
     level: float
+    of_signal: int = 0
+    """Power of the channel's own signal that it correlates with; 0 for another."""
 
     @property
     def white(self) -> bool:
@@ -67,11 +71,12 @@ def patches(before: Whiteness, after: Whiteness) -> bool:
     )
 
 
-def whiteness(residual: Array, inputs: Array) -> Whiteness:
-    """Test of a residual (n_outputs, n) against its own past and against the inputs (n_inputs, n).
+def whiteness(residual: Array, inputs: Array, signals: Array | None = None) -> Whiteness:
+    """Test of a residual (n_outputs, n) against its own past, the inputs (n_inputs, n) and powers of the signals.
 
     Under white noise every correlation is Gaussian with variance 1 / n; the limit is that of the largest of all of them
-    (Ljung 1999, System Identification, 16.6; Bonferroni).
+    (Ljung 1999, System Identification, 16.6; Bonferroni). Signals (n_outputs, n) are the model's, in which noise has no part:
+    what is left of a clipped or bent one shows in its second and third power, once nothing is left for a straight line.
     """
     n = residual.shape[1]
     e = _normalized(residual)
@@ -83,10 +88,16 @@ def whiteness(residual: Array, inputs: Array) -> Whiteness:
     cross = np.array([[e[:, k:] @ row[: n - k] for k in range(LAGS)] for row in u]).reshape(
         len(u), LAGS, len(e)
     )
-    tests = own.size + cross.size
+    curves = (
+        np.zeros((len(e), 0, n))
+        if signals is None
+        else np.array([_curves(signal) for signal in np.nan_to_num(signals)])
+    )
+    bends = np.einsum("ipk,ik->ip", curves, e)
+    tests = own.size + cross.size + bends.size
     limit = -float(scipy.special.ndtri(LEVEL / (2 * max(tests, 1))))
     k, i = np.unravel_index(np.argmax(np.abs(own)), own.shape)
-    shares = _predictable(e, u)
+    shares = _predictable(e, u, curves)
     told = (
         float(np.max(shares)),
         float(-np.sum(np.log1p(-np.clip(shares, 0.0, 1 - 1e-12)))),
@@ -98,16 +109,32 @@ def whiteness(residual: Array, inputs: Array) -> Whiteness:
         size = float(np.sqrt(n) * np.abs(cross[j, k, i]))
         if size > best.largest:
             best = Whiteness(size, limit, int(i), int(k), int(j), *told)
+    if bends.size:
+        i, power = np.unravel_index(np.argmax(np.abs(bends)), bends.shape)
+        size = float(np.sqrt(n) * np.abs(bends[i, power]))
+        if size > best.largest:
+            best = Whiteness(size, limit, int(i), 0, None, *told, of_signal=POWERS[power])
     return best
 
 
-def _predictable(e: Array, u: Array) -> Array:
-    """Share of each channel's power that a regression on its past and on the inputs explains, adjusted for its size."""
+def _curves(signal: Array) -> Array:
+    """Second and third power of a signal (n,), each less what lower ones and a constant make of it, of unit length, (2, n)."""
+    x = signal / max(float(np.sqrt(np.mean(signal**2))), 1e-300)
+    Q, R = np.linalg.qr(np.stack([np.ones_like(x), x, x**2, x**3], axis=1))
+    # A square wave is its own third power.
+    new = np.abs(np.diag(R)) > 1e-6 * np.sqrt(x.size)
+    return np.asarray(np.where(new, Q, 0.0)[:, 2:].T)
+
+
+def _predictable(e: Array, u: Array, curves: Array) -> Array:
+    """Share of each channel's power that a regression on past, inputs and its own curves explains, adjusted for its size."""
     n = e.shape[1] - LAGS
     driven = [row[LAGS - k : LAGS - k + n] for row in u for k in range(LAGS)]
     shares = []
-    for row in e:
-        regressors = np.array([row[LAGS - k : LAGS - k + n] for k in range(1, LAGS + 1)] + driven)
+    for i, row in enumerate(e):
+        regressors = np.array(
+            [row[LAGS - k : LAGS - k + n] for k in range(1, LAGS + 1)] + driven + list(curves[i][:, LAGS:])
+        )
         target = row[LAGS:]
         found = np.linalg.lstsq(regressors @ regressors.T, regressors @ target, rcond=1e-10)[0]
         left = target - found @ regressors

@@ -102,7 +102,10 @@ def left_over(left: Whiteness, recording: Recording) -> str:
     channel = recording.outputs[left.channel].name
     time = left.lag / recording.sample_rate
     source = "its own past" if left.with_input is None else f"input {left.with_input + 1}"
+    source = f"{source} at a lag of {time:.4g} s"
+    if left.of_signal:
+        source = f"the {'square' if left.of_signal == 2 else 'cube'} of what it should read"
     return (
-        f"something is left that no cause in the catalogue explains: the residual of {channel} correlates with {source} "
-        f"at a lag of {time:.4g} s, {left.largest:.1f} standard deviations where noise stays below {left.limit:.1f}"
+        f"something is left that no cause in the catalogue explains: the residual of {channel} correlates with {source}, "
+        f"{left.largest:.1f} standard deviations where noise stays below {left.limit:.1f}"
     )

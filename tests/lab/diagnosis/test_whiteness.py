@@ -38,6 +38,28 @@ def test_what_an_input_explains_is_found():
     assert (found.channel, found.lag, found.with_input) == (2, 5, 1)
 
 
+def test_noise_beside_signals_passes():
+    # One seed in a thousand would fail, whatever the signals.
+    signals = np.array([np.sign(noise(7, 1)[0]), 1e-9 * noise(8, 1)[0], np.zeros(N)])
+    assert all(whiteness(noise(seed), noise(100 + seed, 2), signals).white for seed in range(5))
+
+
+@pytest.mark.parametrize(("bend", "power"), [(lambda y: np.clip(y, -1.5, 1.5), 3), (np.abs, 2)])
+def test_what_is_left_of_a_bent_signal_is_found(bend, power):
+    # Signals without a memory, less the best straight line: past and inputs tell nothing of it.
+    e, y = noise(4), noise(5)
+    left = bend(y[1])
+    left -= np.polyval(np.polyfit(y[1], left, 1), y[1])
+    e[1] = 0.1 * e[1] + left
+    assert whiteness(e, noise(6, 1)).white
+    found = whiteness(e, noise(6, 1), y)
+    assert (found.channel, found.of_signal, found.with_input, found.white) == (1, power, None, False)
+    # An independent regression on what it correlates with; the share scatters by less than 0.02.
+    curve = np.stack([np.ones(N), y[1], y[1] ** 2, y[1] ** 3])
+    explained = e[1] - curve.T @ np.linalg.lstsq(curve.T, e[1])[0]
+    assert found.share == pytest.approx(1 - np.var(explained) / np.var(e[1]), abs=0.02)
+
+
 def test_little_is_passed_over():
     small = Whiteness(9.0, 4.8, 0, 1, None, 0.5 * MATTERS, 0.03, 0.0)
     assert small.passed
