@@ -41,8 +41,8 @@ from lab.effects import EFFECTS
 from lab.errors import LabError
 from lab.files.recording import save
 from lab.hands import by_itself
+from lab.processes import process_pool
 from lab.rig import Rig
-from lab.studies.workers import process_pool
 
 
 @dataclass(frozen=True)

@@ -16,13 +16,15 @@ from functools import lru_cache, partial
 from pathlib import Path
 from typing import Any, TypeVar
 
-from lab.studies.workers import cores, process_pool
+from lab.processes import cores, one_thread_each, process_pool
 
 Item = TypeVar("Item")
 Outcome = TypeVar("Outcome")
 
 AHEAD = 2
 """Pieces at each helper, so that none idles between two."""
+MOST = 7
+"""Helpers that are called where nobody says how many: each loads the whole program, and pieces are not endless."""
 
 
 @dataclass
@@ -56,24 +58,26 @@ def helped(*modules: str, n: int | None = None) -> Iterator[None]:
 
     Args:
         modules: that they load at once.
-        n: how many; one for each further core when None.
+        n: how many; when None, one for each further core, up to `MOST`.
     """
-    n = cores() - 1 if n is None else n
+    n = min(cores() - 1, MOST) if n is None else n
     if n < 1 or HANDS.helpers is not None or HANDS.alone:
         yield
         return
     before = set(multiprocessing.active_children())
-    with tempfile.TemporaryDirectory(prefix="lab-") as folder:
+    with tempfile.TemporaryDirectory(prefix="lab-", ignore_cleanup_errors=True) as folder:
         executor = process_pool(n, by_itself)
-        for _ in range(n):
-            executor.submit(_load, modules)
+        with one_thread_each():
+            for _ in range(n):
+                executor.submit(_load, modules)
+        own = set(multiprocessing.active_children()) - before
         HANDS.helpers, HANDS.n_helpers, HANDS.folder = executor, n, folder
         try:
             yield
         finally:
             HANDS.helpers, HANDS.n_helpers = None, 0
             executor.shutdown(wait=False, cancel_futures=True)
-            for helper in set(multiprocessing.active_children()) - before:
+            for helper in own:
                 helper.kill()
                 helper.join()
 
@@ -90,21 +94,24 @@ def shared(function: Callable[[Item], Outcome], items: Sequence[Item]) -> Iterat
         function: what to do; helpers get a copy, so that it may neither be a local function nor remember anything.
         items: with what.
     """
-    order = _ordered(function) if HANDS.helpers is not None and len(items) > 1 else None
-    if order is None:
+    task = _task(function) if HANDS.helpers is not None and len(items) > 1 else None
+    if task is None:
         yield from map(function, items)
         return
     waiting, sent = deque(range(len(items))), dict[int, Future[Any]]()
-    for number, item in enumerate(items):
-        # The far end is theirs, so that outcomes come in order from this one.
-        while len(waiting) > 1 and sum(not f.done() for f in sent.values()) < AHEAD * HANDS.n_helpers:
-            last = waiting.pop()
-            sent[last] = _sent(_piece, order, items[last])
-        if number in sent:
-            yield _received(sent[number], partial(function, item))
-        else:
-            waiting.popleft()
-            yield _alone(function, item)
+    try:
+        for number, item in enumerate(items):
+            # The far end is theirs, so that outcomes come in order from this one.
+            while len(waiting) > 1 and sum(not f.done() for f in sent.values()) < AHEAD * HANDS.n_helpers:
+                last = waiting.pop()
+                sent[last] = _sent(_piece, task, items[last])
+            if number in sent:
+                yield _received(sent[number], partial(function, item))
+            else:
+                waiting.popleft()
+                yield _alone(function, item)
+    finally:
+        Path(task).unlink(missing_ok=True)
 
 
 def meanwhile(function: Callable[..., Outcome], *arguments: Any, **options: Any) -> Callable[[], Outcome]:
@@ -115,32 +122,36 @@ def meanwhile(function: Callable[..., Outcome], *arguments: Any, **options: Any)
     return partial(_received, _sent(function, *arguments, **options), here)
 
 
-def _ordered(function: Callable[[Any], Any]) -> str | None:
+def _task(function: Callable[[Any], Any]) -> str | None:
     """The file that tells helpers what to do; None where it cannot be told."""
     try:
         told = pickle.dumps(function, protocol=pickle.HIGHEST_PROTOCOL)
-    except (pickle.PicklingError, TypeError, AttributeError):
+        handle, path = tempfile.mkstemp(dir=HANDS.folder)
+        with os.fdopen(handle, "wb") as file:
+            file.write(told)
+    except (pickle.PicklingError, TypeError, AttributeError, OSError):
         return None
-    handle, path = tempfile.mkstemp(dir=HANDS.folder)
-    with os.fdopen(handle, "wb") as file:
-        file.write(told)
     return path
 
 
 def _sent(function: Callable[..., Any], *arguments: Any, **options: Any) -> Future[Any]:
     """The outcome to come; a failed one where no helper is left."""
-    assert HANDS.helpers is not None
+    lost: Future[Any] = Future()
+    lost.set_exception(RuntimeError("no helper is left"))
+    if HANDS.helpers is None:
+        return lost
     try:
         return HANDS.helpers.submit(function, *arguments, **options)
-    except RuntimeError as error:
-        lost: Future[Any] = Future()
-        lost.set_exception(error)
+    except (RuntimeError, OSError):
         return lost
 
 
 def _received(outcome: Future[Outcome], here: Callable[[], Outcome]) -> Outcome:
     """What a helper found; found here where it did not get there, so that every error is met in this process."""
-    return here() if outcome.exception() is not None else outcome.result()
+    try:
+        return outcome.result()
+    except Exception:
+        return here()
 
 
 def _alone(function: Callable[[Item], Outcome], item: Item) -> Outcome:

@@ -35,23 +35,28 @@ def bent(state: State, recording: Recording, rig: Rig) -> State:
         return state
     misfit, found = state.misfit, state.fit
     model = extended_rig(state, rig)
-    starts = [
-        None if start is None else start_of(model, rig.dofs, start)
-        for start in starts_of(misfit, found.theta)
-    ]
+    begins = starts_of(misfit, found.theta)
     try:
+        starts = [None if begin is None else start_of(model, rig.dofs, begin) for begin in begins]
         outputs = replay(model, recording, accuracy=accuracy_of(state), starts=starts)
     except LabError:
         return state
     tangent = predicted(replace(misfit, bend=()), found)
-    bend = tuple(np.nan_to_num(real - own) for real, own in zip(outputs, tangent, strict=True))
+    missing = [np.isnan(y) for _, y in misfit.records]
+    bend = tuple(
+        np.where(gap, 0.0, real - own) for real, own, gap in zip(outputs, tangent, missing, strict=True)
+    )
+    if not all(np.all(np.isfinite(part)) for part in bend):
+        return state
     misfit = replace(misfit, bend=bend)
     fit = resumed(misfit, found, iterations=15, tolerance=0.1)
     if not fit.objective < found.objective - SHOWN:
         return state
     guided = fit if state.accepted else resumed(misfit, state.calibration.guided, iterations=5)
     calibration = replace(state.calibration, misfit=misfit, fit=fit, guided=guided)
-    held_out = (*state.held_out[:-1], held_out_error(misfit, fit))
+    # What the causes gain is counted from a model that bends, too.
+    first = (held_out_error(misfit, state.origin),) if state.accepted else ()
+    held_out = (*first, *state.held_out[1:-1], held_out_error(misfit, fit))
     return replace(
         state,
         calibration=calibration,

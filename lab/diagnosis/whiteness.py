@@ -119,7 +119,8 @@ def whiteness(residual: Array, inputs: Array, signals: Array | None = None) -> W
 
 def _curves(signal: Array) -> Array:
     """Second and third power of a signal (n,), each less what lower ones and a constant make of it, of unit length, (2, n)."""
-    x = signal / max(float(np.sqrt(np.mean(signal**2))), 1e-300)
+    x = signal - np.mean(signal)
+    x = x / max(float(np.sqrt(np.mean(x**2))), 1e-300)
     Q, R = np.linalg.qr(np.stack([np.ones_like(x), x, x**2, x**3], axis=1))
     # A square wave is its own third power.
     new = np.abs(np.diag(R)) > 1e-6 * np.sqrt(x.size)

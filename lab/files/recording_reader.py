@@ -136,8 +136,8 @@ def _groups(file: Any) -> list[Any]:
     )
     if not names and "frequency_responses" in file:
         raise FileError(
-            "holds frequency responses and no samples; expected groups /records/0, /records/1, …; lab identify and lab diagnose "
-            "take the responses, and so does lab.load_responses in Python"
+            "holds frequency responses and no samples; expected groups /records/0, /records/1, …; lab identify and "
+            "lab diagnose take the responses, and so does lab.load_responses in Python"
         )
     if not names:
         raise FileError("holds no record; expected groups /records/0, /records/1, …")

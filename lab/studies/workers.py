@@ -3,20 +3,16 @@
 from __future__ import annotations
 
 import multiprocessing
-import os
-import signal
 import sys
-import threading
 import time
 from collections.abc import Callable, Iterator
-from concurrent.futures import Executor, Future, ProcessPoolExecutor
+from concurrent.futures import Executor, Future
 from contextlib import contextmanager, suppress
 from dataclasses import dataclass, field
 from typing import Any
 
 from lab.errors import StudyError
-
-LIBRARIES = ("OMP", "OPENBLAS", "MKL")
+from lab.processes import cores, one_thread_each, process_pool
 
 
 @dataclass
@@ -53,7 +49,7 @@ def local_crew(workers: int | None = None) -> Iterator[Crew]:
     n = workers or cores()
     before = set(multiprocessing.active_children())
     # Each has one thread, or sums would depend on the number of cores.
-    with _one_thread_each():
+    with one_thread_each():
         crew = Crew(lambda: process_pool(n), lambda: n, renewable=True)
         try:
             yield crew
@@ -116,46 +112,3 @@ def _now_and_then(ask: Callable[[], int], seconds: float = 5.0) -> Callable[[], 
         return answer
 
     return size
-
-
-def process_pool(n: int, begin: Callable[[], None] | None = None) -> ProcessPoolExecutor:
-    """Fresh processes, which share nothing with this one; each begins with `begin`, and ends when this one does."""
-    spawn = multiprocessing.get_context("spawn")
-    return ProcessPoolExecutor(n, mp_context=spawn, initializer=_settle, initargs=(begin,))
-
-
-def _settle(begin: Callable[[], None] | None) -> None:
-    """Makes a worker leave stopping to its parent, and leave with it."""
-    if begin is not None:
-        begin()
-    signal.signal(signal.SIGINT, signal.SIG_IGN)
-    parent = multiprocessing.parent_process()
-    assert parent is not None
-
-    def leave() -> None:
-        parent.join()
-        os._exit(1)
-
-    threading.Thread(target=leave, daemon=True).start()
-
-
-def cores() -> int:
-    """Cores that this process may use."""
-    if hasattr(os, "sched_getaffinity"):
-        return len(os.sched_getaffinity(0))
-    return os.cpu_count() or 1
-
-
-@contextmanager
-def _one_thread_each() -> Iterator[None]:
-    names = [f"{library}_NUM_THREADS" for library in LIBRARIES]
-    before = {name: os.environ.get(name) for name in names}
-    os.environ.update(dict.fromkeys(names, "1"))
-    try:
-        yield
-    finally:
-        for name, value in before.items():
-            if value is None:
-                os.environ.pop(name, None)
-            else:
-                os.environ[name] = value
