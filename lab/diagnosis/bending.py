@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 
 from identification.recording import Recording
-from lab.diagnosis.conclude import accuracy_of, extended_rig
+from lab.diagnosis.conclude import accuracy_below, extended_rig, floor_of
 from lab.diagnosis.fit import resumed
 from lab.diagnosis.gain import held_out_error, predicted
 from lab.diagnosis.starts import start_of, starts_of
@@ -38,7 +38,7 @@ def bent(state: State, recording: Recording, rig: Rig) -> State:
     begins = starts_of(misfit, found.theta)
     try:
         starts = [None if begin is None else start_of(model, rig.dofs, begin) for begin in begins]
-        outputs = replay(model, recording, accuracy=accuracy_of(state), starts=starts)
+        outputs = replay(model, recording, accuracy=accuracy_below(floor_of(state)), starts=starts)
     except LabError:
         return state
     tangent = predicted(replace(misfit, bend=()), found)

@@ -122,7 +122,7 @@ def conclude(
     calibrated = calibrated_rig(state.misfit, state.origin.theta, rig)
     extended = extended_rig(state, rig)
     misfit = state.misfit
-    floor = noise_floor(state.fit.residual, held_out(misfit))
+    floor = floor_of(state)
     starts = [best_starts(misfit), starts_of(misfit, state.origin.theta), starts_of(misfit, state.fit.theta)]
     predictions = predictions_of(
         recording,
@@ -130,7 +130,7 @@ def conclude(
         (nominal, calibrated, extended),
         starts,
         expected=predicted(misfit, state.fit),
-        accuracy=accuracy_of(state),
+        accuracy=accuracy_below(floor),
         work=work,
     )
     shares = _shares(state, floor)
@@ -169,15 +169,19 @@ def conclude(
 def extended_rig(state: State, rig: Rig) -> Rig:
     """The rig with its parameters as fitted, and with the causes so far."""
     extended = calibrated_rig(state.misfit, state.fit.theta, rig)
-    for candidate, effect, _ in effects_of(state):
-        if candidate.direction is None:
-            extended = effect.apply(extended)
+    for cause in state.fit.causes:
+        extended = cause.effect.apply(extended)
     return extended
 
 
-def accuracy_of(state: State) -> float:
+def floor_of(state: State) -> float:
+    """Noise over signal, as the fit so far leaves it."""
+    return noise_floor(state.fit.residual, held_out(state.misfit))
+
+
+def accuracy_below(floor: float) -> float:
     """Relative error of a simulation that noise hides."""
-    return max(0.2 * noise_floor(state.fit.residual, held_out(state.misfit)), 1e-6)
+    return max(0.2 * floor, 1e-6)
 
 
 def _shares(state: State, floor: float) -> list[float]:

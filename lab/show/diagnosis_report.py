@@ -6,7 +6,6 @@ from collections.abc import Callable, Mapping
 from functools import partial
 from pathlib import Path
 
-from identification.progress import UNHEARD, Work
 from identification.recording import Recording
 from lab.diagnosis.outcome import UNEXPLAINED, Diagnosis
 from lab.diagnosis.restoring import restoring_force
@@ -39,7 +38,6 @@ def write_diagnosis_report(
     *,
     command: str = "",
     facts: Mapping[str, str] | None = None,
-    work: Work = UNHEARD,
 ) -> None:
     """Writes one HTML file that needs no other; the same data give the same bytes.
 
@@ -49,7 +47,6 @@ def write_diagnosis_report(
         recording: what it was found in, with the channels of the diagnosis.
         command: how the lab was called.
         facts: further facts to reproduce the diagnosis, by name.
-        work: told of every figure.
     """
     path = Path(path)
     restoring = restoring_force(diagnosis, recording) if isinstance(recording, Recording) else None
@@ -60,7 +57,7 @@ def write_diagnosis_report(
         *figures_of(diagnosis, recording),
         partial(calibration_figure, diagnosis),
     ]
-    drawings = [figure() for figure in work.each(figures)]
+    drawings = [figure() for figure in figures]
     own = {**surroundings(), **checksums(path.parent, BESIDE)}
     page = template("diagnosis.html.jinja").render(
         title=title_of(diagnosis, recording),
