@@ -18,6 +18,17 @@ REORDERED = {"reassoc", "contract", "nsz"}
 """What the compiler may do to sums; it must still know NaN and infinity."""
 
 
+@njit(cache=True, nogil=True)
+def lagged(signal, share):  # type: ignore[no-untyped-def]
+    """A signal (n,) behind a first-order lag from rest, which takes up that share of the way left at every sample."""
+    out = np.empty(signal.size)
+    y = 0.0
+    for k in range(signal.size):
+        y += share * (signal[k] - y)
+        out[k] = y
+    return out
+
+
 @njit(cache=True, nogil=True, fastmath=REORDERED)
 def force(law, p, x, v, s):  # type: ignore[no-untyped-def]
     """Restoring force of a law without memory; the laws are those of `lab.forces`."""

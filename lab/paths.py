@@ -67,9 +67,9 @@ def pushed(paths: Sequence[Path], inputs: Array, dt: float) -> list[Array]:
     for path, row in zip(paths, inputs, strict=True):
         if path.held_lag:
             share = -np.expm1(-dt / path.held_lag)
-            from scipy.signal import lfilter  # slow to load, and only lagging actuators need it
+            from lab.kernel import lagged  # slow to load, and only lagging actuators need it
 
-            row = lfilter([share], [1, share - 1], row)
+            row = lagged(np.ascontiguousarray(row, dtype=float), share)
         force = np.clip(path.gain * row, -path.limit, path.limit) if _acts(path) else row
         whole, part = path.parts(dt)
         forces.append(_shifted(force, whole + (part > 0)))

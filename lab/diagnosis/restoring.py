@@ -209,8 +209,15 @@ def _deconvolved(h: Array, e: Array, weight: Array, scale: float) -> Array:
         return np.asarray(scipy.fft.irfft(back.sum(axis=0), size)[:n])
 
     prior = 1 / scale**2
+    # What the normal equations were for an endless record with nothing missing: twenty iterations instead of a thousand.
+    endless = (np.mean(weight**2, axis=1) @ np.abs(H) ** 2) + prior
+
+    def nearly(r: Array) -> Array:
+        return np.asarray(scipy.fft.irfft(scipy.fft.rfft(r.ravel(), size) / endless, size)[:n])
+
     normal = scipy.sparse.linalg.LinearOperator(
         (n, n), matvec=lambda f: adjoint(weight**2 * response(f.ravel())) + prior * f.ravel(), dtype=float
     )
-    found, _ = scipy.sparse.linalg.cg(normal, adjoint(weight**2 * e), rtol=1e-8, maxiter=2000)
+    start = scipy.sparse.linalg.LinearOperator((n, n), matvec=nearly, dtype=float)
+    found, _ = scipy.sparse.linalg.cg(normal, adjoint(weight**2 * e), rtol=1e-8, maxiter=2000, M=start)
     return np.asarray(found)

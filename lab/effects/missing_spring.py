@@ -18,7 +18,6 @@ from lab.mjcf import number
 from lab.plant import Plant
 from lab.ports import name_of
 from lab.rig import Rig
-from lab.twin import spring_rows
 
 WORLD = "world"
 
@@ -44,9 +43,8 @@ class MissingSpring(Effect):
         a, _, b = self.location.partition("|")
         for name in (a, b):
             self.require(name, (WORLD, *rig.bodies), "body")
-        tendon = _straight(rig, a, b)
-        if tendon is None:
-            rig, tendon = _spatial(rig, a, b)
+        turns = _straight(rig, a, b)
+        rig, tendon = _spatial(rig, a, b) if turns is None else (rig, _fixed(rig, turns))
         tendon.set("name", f"spring@{a}|{b}")
         tendon.set("stiffness", number(self.stiffness))
         tendon.set("damping", number(self.damping))
@@ -83,7 +81,13 @@ class MissingSpring(Effect):
 
 @lru_cache(maxsize=4096)
 def _row_of(rig: Rig, location: str) -> np.ndarray:
-    return spring_rows(MissingSpring(location, 1.0).apply(rig))[-1]
+    a, _, b = location.partition("|")
+    turns = _straight(rig, a, b)
+    if turns is not None:
+        return np.array([turns.get(name, 0.0) for name in rig.dofs])
+    (here, J), (there, other) = (_motion(rig)[body] for body in (a, b))
+    along = there - here
+    return np.asarray(along @ (other - J) / np.linalg.norm(along))
 
 
 def _lone_slide(rig: Rig, body: str) -> tuple[str, np.ndarray] | None:
@@ -102,8 +106,8 @@ def _lone_slide(rig: Rig, body: str) -> tuple[str, np.ndarray] | None:
     return rig.dofs[joint], data.xaxis[joint].copy()
 
 
-def _straight(rig: Rig, a: str, b: str) -> ET.Element | None:
-    """A fixed tendon between bodies that slide along one direction, at rest where they rest."""
+def _straight(rig: Rig, a: str, b: str) -> dict[str, float] | None:
+    """Extension per displacement of the joints, between bodies that slide along one direction."""
     slides = [(1.0 if body == b else -1.0, _lone_slide(rig, body)) for body in (a, b) if body != WORLD]
     if any(slide is None or not slide[0] for _, slide in slides):
         return None
@@ -112,11 +116,15 @@ def _straight(rig: Rig, a: str, b: str) -> ET.Element | None:
     if abs(abs(along) - 1) > 1e-9:
         return None
     signs = [1.0, 1.0] if along > 0 else [1.0, -1.0]
-    joints = {
+    return {
         slide[0]: sign * turn for (sign, slide), turn in zip(slides, signs, strict=False) if slide is not None
     }
-    tendon = fixed_tendon("", joints)
-    at_rest = sum(c * rig.operating_point[rig.dofs.index(joint)] for joint, c in joints.items())
+
+
+def _fixed(rig: Rig, turns: dict[str, float]) -> ET.Element:
+    """A fixed tendon over joints, at rest where they rest."""
+    tendon = fixed_tendon("", turns)
+    at_rest = sum(c * rig.operating_point[rig.dofs.index(joint)] for joint, c in turns.items())
     tendon.set("springlength", number(at_rest))
     return tendon
 
@@ -154,6 +162,7 @@ def _possible(rig: Rig, pair: str) -> bool:
     return WORLD not in (a, b) or _lone_slide(rig, b) is not None
 
 
+@lru_cache(maxsize=16)
 def _motion(rig: Rig) -> dict[str, tuple[np.ndarray, np.ndarray]]:
     """Place of the origin of every body that can move, and its motion per displacement, (3,) and (3, n_dofs)."""
     m, data = rig.model, mujoco.MjData(rig.model)
