@@ -111,6 +111,18 @@ def _stick(S, T, R, x, u, laws, params, stuck, g):  # type: ignore[no-untyped-de
 
 
 @njit(cache=True, nogil=True, fastmath=REORDERED)
+def _yielding(p, z, dx):  # type: ignore[no-untyped-def]
+    """Force of a Bouc-Wen spring after a way dx from force z: straight down to zero, then towards its level."""
+    sign, left = (1.0, dx) if dx > 0 else (-1.0, -dx)
+    g = sign * z
+    if g < 0:
+        straight = min(left, -g / p[0])
+        g += p[0] * straight
+        left -= straight
+    return sign * (g - math.expm1(-left / p[1]) * (p[0] * p[1] - g))
+
+
+@njit(cache=True, nogil=True, fastmath=REORDERED)
 def _stacked(A, B, C):  # type: ignore[no-untyped-def]
     """A, B and C side by side, with rows of zeros that make their number a multiple of four."""
     n, a, b = A.shape[0], A.shape[1], A.shape[1] + B.shape[1]
@@ -202,7 +214,10 @@ def respond(F, turns, G, P, Q, X, V, S, T, R, at, C, D, E, laws, params, u, x0, 
                     xe += X[e, j] * x[j]
                     ve += V[e, j] * x[j]
                 if laws[e] == BOUC_WEN:
-                    g[e] = z[e]
+                    if pull == 1:
+                        # A spring with a memory remembers where measurements pull it, or its rest would wander.
+                        z[e] = _yielding(params[e], z[e], xe - xs[e])
+                    g[e], xs[e] = z[e], xe
                 elif dry[e]:
                     g[e] = params[e, 0] * np.sign(ve)
                 else:

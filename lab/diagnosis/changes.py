@@ -11,7 +11,7 @@ import numpy as np
 
 from identification.progress import UNHEARD, Work
 from identification.recording import Array
-from lab.diagnosis.fit import Fit, fit, objective
+from lab.diagnosis.fit import Fit, fit, objective, theta_slopes, weights
 from lab.diagnosis.misfit import Hypothesis, Misfit
 from lab.diagnosis.starts import best_starts
 from lab.effects import EFFECTS
@@ -31,6 +31,8 @@ WINDOW = 1024
 WORTH = 20.0
 """-2 log posterior that a trial value must gain to be followed."""
 FOLLOWED = 4
+RESTARTS = 4
+"""Steps by which the start of a free decay is adapted to laws of force, which its first estimate leaves out."""
 FAR = 4.0
 """Widths beyond which a parameter may have gone to make up for a cause, which then shows better from the model as given."""
 
@@ -87,8 +89,11 @@ def _best_factor(seen: Misfit, present: Fit, begun: tuple[tuple[str, str, Array]
     trials = []
     for factor in DAMPING_FACTORS if cause == "damping_change" else FACTORS:
         theta = _restarted(seen, start + np.log(factor) * direction / seen.parameters.widths)
-        trials.append((_level(lifted, present, theta, present.causes), cause, location, direction, theta))
-    return min(trials, key=lambda trial: trial[0])
+        trials.append((_level(lifted, present, theta, present.causes), theta))
+    level, theta = min(trials, key=lambda trial: trial[0])
+    if seen.parameters.started and seen.plant(theta, present.causes).laws:
+        level, theta = _started_again(lifted, present, level, theta)
+    return level, cause, location, direction, theta
 
 
 def _followed(misfit: Misfit, present: Fit, trial: _Trial) -> Fit:
@@ -138,6 +143,24 @@ def _level(misfit: Misfit, present: Fit, theta: Array, causes: Sequence[Hypothes
     """-2 log posterior of parameters and causes."""
     e = misfit.residual(theta, causes, observer=present.observer)
     return objective(e, theta, misfit.parameters.precision, misfit.colour)
+
+
+def _started_again(misfit: Misfit, present: Fit, level: float, theta: Array) -> tuple[float, Array]:
+    """-2 log posterior and parameters with starts that suit them, the laws of force acting, too."""
+    starts = range(misfit.parameters.n_factors, misfit.parameters.n)
+    P = misfit.parameters.precision[starts.start :, starts.start :]
+    for _ in range(RESTARTS):
+        e = misfit.residual(theta, present.causes, observer=present.observer)
+        w = weights(e, misfit.colour)[:, None]
+        J = theta_slopes(misfit, theta, present.causes, present.observer, e, None, starts)
+        A = (J * w).reshape(len(J), -1)
+        moved = theta.copy()
+        moved[starts] -= np.linalg.solve(A @ A.T + P, A @ (e * w).ravel() + P @ theta[starts])
+        reached = _level(misfit, present, moved, present.causes)
+        if not reached < level:
+            break
+        level, theta = reached, moved
+    return level, theta
 
 
 def _restarted(misfit: Misfit, theta: Array) -> Array:

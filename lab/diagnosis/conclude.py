@@ -13,6 +13,7 @@ from lab.diagnosis import words
 from lab.diagnosis.baseline import Baseline
 from lab.diagnosis.candidate import Candidate
 from lab.diagnosis.check import check
+from lab.diagnosis.evidence import ratio_spread
 from lab.diagnosis.gain import errors_of, held_out, noise_floor, predicted, predictions_of
 from lab.diagnosis.misfit import Misfit
 from lab.diagnosis.noise import noise_of
@@ -144,19 +145,24 @@ def conclude(
     elif not left.passed:
         verdict = UNEXPLAINED
         warnings.append(words.left_over(left, recording))
+    errors = errors_of(predictions, floor)
+    # A baseline excuses what is left; then the data kept aside must tell whether what was named explains anything.
+    if known is not None and findings and errors.extended > errors.calibrated:
+        verdict = UNEXPLAINED
+        warnings.append(words.no_gain(errors))
     if refused is not None:
         verdict = UNEXPLAINED
         warnings.append(words.not_to_be_named(refused.cause, refused.location))
     if known is not None and findings:
         warnings += [words.shared(name, std) for name, std in known.gains.items()]
-    alternatives = _alternatives(first) if findings else ()
+    alternatives = _alternatives(first, misfit.colour) if findings else ()
     warnings += words.inseparable(alternatives)
     return Diagnosis(
         verdict,
         tuple(sorted(findings, key=lambda f: -f.holdout_gain)),
         alternatives,
         calibration_of(state),
-        errors_of(predictions, floor),
+        errors,
         predictions,
         nominal,
         extended,
@@ -191,16 +197,17 @@ def _shares(state: State, floor: float) -> list[float]:
     return [float(np.clip((a - b) / excess, 0.0, 1.0)) for a, b in itertools.pairwise(errors)]
 
 
-def _alternatives(first: Sequence[Candidate]) -> tuple[Alternative, ...]:
+def _alternatives(first: Sequence[Candidate], colour: float) -> tuple[Alternative, ...]:
     """The next best explanations of the first finding."""
     told = first[0]
-    return tuple(
-        Alternative(
-            c.cause, c.location, 0.5 * c.gain, words.advice(told.cause, c.cause, 0.5 * (told.gain - c.gain))
-        )
-        for c in first[1:6]
-        if c.gain > 0
-    )
+    found = []
+    for c in first[1:6]:
+        if c.gain > 0:
+            # Noise is part of the evidence; a model that errs otherwise than by noise leaves more to chance.
+            spread = ratio_spread(told.fit, c.fit, colour) if colour > 1 else 0.0
+            advice = words.advice(told.cause, c.cause, 0.5 * (told.gain - c.gain), spread)
+            found.append(Alternative(c.cause, c.location, 0.5 * c.gain, advice))
+    return tuple(found)
 
 
 def calibration_of(state: State) -> dict[str, Calibrated]:

@@ -13,6 +13,9 @@ SPREADS = np.geomspace(0.1, 6.0, 15)
 DOUBT = float(np.log(2))
 """How far the stated widths may be off: a factor of two is one standard deviation."""
 
+STRETCH = 4
+"""Length of the stretches of time that count as independent, in samples that count as one."""
+
 
 def minus_two_log_evidence(fit: Fit, *, free: Array | None = None) -> float:
     """-2 log evidence of a fit up to a constant, the spread of the model's errors estimated with it.
@@ -51,6 +54,26 @@ def minus_two_log_evidence(fit: Fit, *, free: Array | None = None) -> float:
         best = min(best, fit.deviance + change + (theta + d) @ precision @ (theta + d) + occam + doubt)
     variables = sum(max(cause.n, 1) for cause in fit.causes) + loose.shape[1]
     return float(best + variables * np.log(total))
+
+
+def ratio_spread(told: Fit, other: Fit, colour: float) -> float:
+    """Standard deviation of the log likelihood ratio of two fits of the same data, told by its parts over time.
+
+    Where models err by more than noise, errors decide between causes that are both wrong somewhere (Vuong 1989, Econometrica
+    57, 307-333, section 4; over stretches of time instead of samples, as errors stay alike for a while).
+
+    Args:
+        told, other: fits, with residuals (n_outputs, n).
+        colour: samples that count as one.
+    """
+    a, b = (
+        fit.residual**2 / np.maximum(np.mean(fit.residual**2, axis=1, keepdims=True), 1e-300)
+        for fit in (told, other)
+    )
+    share = (b - a).sum(axis=0) / (2 * colour)
+    n_parts = max(share.size // int(np.ceil(STRETCH * colour)), 2)
+    parts = np.array([part.sum() for part in np.array_split(share, n_parts)])
+    return float(np.sqrt(n_parts) * parts.std(ddof=1))
 
 
 def _of_parameters(information: Array, n: int) -> Array:

@@ -82,22 +82,23 @@ def theta_slopes(
     observer: Array,
     residual: Array,
     n_train: Sequence[int] | None,
+    which: Sequence[int] | None = None,
 ) -> Array:
-    """Derivative of the residual by every parameter, (n_parameters, n_outputs, n_total)."""
+    """Derivative of the residual by every parameter, or by some of them, (n_parameters, n_outputs, n_total)."""
     step = KINKED_STEP if _kinked(misfit, theta, causes) else STEP
+    numbers = range(theta.size) if which is None else which
+    slopes = np.empty((len(numbers), *residual.shape))
 
-    slopes = np.empty((theta.size, *residual.shape))
-
-    def slope(j: int) -> None:
+    def slope(row: int) -> None:
         moved = theta.copy()
-        moved[j] += step
+        moved[numbers[row]] += step
         # In place: all slopes together are large, and a copy of them takes as long as some responses.
         np.subtract(
-            misfit.residual(moved, causes, observer=observer, n_train=n_train), residual, out=slopes[j]
+            misfit.residual(moved, causes, observer=observer, n_train=n_train), residual, out=slopes[row]
         )
-        slopes[j] /= step
+        slopes[row] /= step
 
-    for _ in beside(slope, range(theta.size)):
+    for _ in beside(slope, range(len(numbers))):
         pass
     return slopes
 

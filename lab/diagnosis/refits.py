@@ -172,7 +172,9 @@ def steadied(calibration: Calibration, candidates: list[Candidate], without: flo
     steps = np.geomspace(share / 10, NEGLIGIBLE, max(int(2 * np.log10(share / 10 / NEGLIGIBLE)), 0) + 1)
     for share in steps:
         observer = kalman_gain(misfit, theta, share)
-        guided = fit(misfit, theta, causes, observer=observer, iterations=8, tolerance=5)
-        theta, causes = guided.theta, guided.causes
+        led_on = tried(misfit, theta, causes, observer, iterations=8, tolerance=5)
+        if led_on is None:
+            return candidates
+        guided, theta, causes = led_on, led_on.theta, led_on.causes
     steady = last_of(guided, first.guided, without)
     return [steady if c is first and steady.gain > c.gain else c for c in candidates]

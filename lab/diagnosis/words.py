@@ -7,7 +7,7 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 
 from identification.recording import Array, Recording
-from lab.diagnosis.outcome import Alternative, Quantity
+from lab.diagnosis.outcome import Alternative, Errors, Quantity
 from lab.diagnosis.whiteness import Whiteness
 from lab.effects.effect import EVERYWHERE, Effect
 
@@ -48,14 +48,15 @@ def says(effect: Effect, quantities: Mapping[str, Quantity]) -> str:
     return f"{named} ({kind[:1].lower()}{kind[1:]})."
 
 
-def advice(told: str, other: str, gap: float) -> str:
-    """Which measurement tells two causes apart, when the data hardly do: evidence within e⁵ of each other."""
-    if gap > 5:
+def advice(told: str, other: str, gap: float, spread: float = 0.0) -> str:
+    """Which measurement tells two causes apart, when the data hardly do: their evidence within e⁵ or two of its spreads."""
+    if gap > max(5, 2 * spread):
         return ""
     measurement = ALIKE.get(
         frozenset({told, other}), "repeat the test with another input, level or one more sensor"
     )
-    return f"these data cannot separate it from {told.replace('_', ' ')}: {measurement}"
+    it = "it from the same elsewhere" if told == other else f"it from {told.replace('_', ' ')}"
+    return f"these data cannot separate {it}: {measurement}"
 
 
 def inseparable(alternatives: Sequence[Alternative]) -> list[str]:
@@ -94,6 +95,14 @@ def as_in_the_baseline(power: Array, recording: Recording) -> str:
     return (
         f"the model errs in the baseline too ({shares}, RMS), and no more is left here; the evidence counts samples with alike "
         "errors as one"
+    )
+
+
+def no_gain(errors: Errors) -> str:
+    """What was named makes predictions worse."""
+    return (
+        f"what was named does not predict the data kept aside: the extended model errs by {100 * errors.extended:.3g} % of the "
+        f"signal there, the calibrated one by {100 * errors.calibrated:.3g} %; the cause may be another, or one of several"
     )
 
 

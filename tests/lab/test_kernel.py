@@ -1,8 +1,11 @@
 """The kernel: the same compiled and plain, of second order, and honest where the motion diverges."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 import scipy.linalg
+import scipy.signal
 
 from lab import forces, kernel, plant
 from lab.plant import ready
@@ -46,7 +49,17 @@ def test_compiled_is_plain(names, worth, monkeypatch):
     monkeypatch.setattr(plant, "WORTH_PAIRING", worth)
     responder, u = ready(with_laws(*names), DT, substeps=4), pushes(25)
     compiled = responder.outputs(u, 25)
-    for function in ("force", "_dry", "_rounded", "_stick", "_stacked", "_product", "_turned", "respond"):
+    for function in (
+        "force",
+        "_dry",
+        "_rounded",
+        "_stick",
+        "_yielding",
+        "_stacked",
+        "_product",
+        "_turned",
+        "respond",
+    ):
         monkeypatch.setattr(kernel, function, getattr(kernel, function).py_func)
     # The compiler may join a product and a sum, and take sums in another order: both change the rounding only.
     assert error(responder.outputs(u, 25), compiled) < 1e-11
@@ -65,6 +78,27 @@ def test_states_in_pairs_are_the_states(names, observed, monkeypatch):
         found.append(responder.outputs(u, 300, initial=start, observer=gain, measured=y))
     # Shapes with a condition below a hundred here cost two digits, 1200 substeps another one or two.
     assert error(*found) < 1e-11
+
+
+def test_a_memory_that_never_yields_is_a_spring_where_measurements_pull_the_state():
+    u, y = pushes(300), np.random.default_rng(1).standard_normal((5, 300))
+    gain, stiff = 1e-2 * np.random.default_rng(2).standard_normal((6, 5)), 30.0
+    bare = with_laws()
+    remembering = bare.with_law(forces.BOUC_WEN, SPRING, stiff, 1e9)
+    stiffened = replace(bare, stiffness=bare.stiffness + stiff * np.outer(SPRING, SPRING))
+    found = [
+        ready(each, DT, substeps=64).outputs(u, 300, observer=gain, measured=y)
+        for each in (remembering, stiffened)
+    ]
+    # The force of a law is a straight line over a substep: of second order, a sixty-fourth of the sample squared.
+    assert error(*found) < 1e-3
+
+
+def test_a_lag_is_the_digital_filter():
+    signal = np.random.default_rng(3).standard_normal(500)
+    filtered = scipy.signal.lfilter([0.2], [1, -0.8], signal)
+    for lagged in (kernel.lagged, kernel.lagged.py_func):
+        assert lagged(signal, 0.2) == pytest.approx(filtered, abs=1e-13)
 
 
 def test_every_law_is_tried():

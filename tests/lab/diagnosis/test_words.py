@@ -16,6 +16,11 @@ def test_advice_where_the_evidence_is_close_and_nowhere_else():
     assert "another input, level or one more sensor" in advice("freeplay", "line_hum", 0.0)
 
 
+def test_advice_where_the_evidence_is_no_more_certain_than_chance():
+    assert advice("cubic_stiffness", "gap_contact", 9.0, spread=4.4) == ""
+    assert advice("cubic_stiffness", "gap_contact", 9.0, spread=4.6) != ""
+
+
 def test_a_warning_for_each_pair_that_cannot_be_told_apart():
     close = Alternative(
         "gap_contact", "spring1|spring2", 10.0, "these data cannot separate it from this: do that"
