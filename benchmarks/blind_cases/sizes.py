@@ -69,6 +69,8 @@ def _damping_change(scale: Scale, rng: np.random.Generator, size: float) -> Hidd
 
 
 def _missing_spring(scale: Scale, rng: np.random.Generator, size: float) -> Hidden:
+    if not scale.structure.untied:
+        return _stiffness_change(scale, rng, size)
     name = str(rng.choice(list(scale.structure.untied)))
     typical = float(np.median([spring.stiffness for spring in scale.structure.springs]))
     return Hidden("missing_spring", name, {"stiffness": typical * float(rng.uniform(0.1, 0.4)) * size})
