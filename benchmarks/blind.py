@@ -20,6 +20,8 @@ import os
 import sys
 import tempfile
 import time
+from collections.abc import Iterator
+from concurrent.futures import as_completed
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
@@ -128,7 +130,12 @@ def run(trials: list[Trial], path: Path, *, jobs: int, write: Path | None) -> No
     todo = [trial for trial in trials if json.dumps(trial.key) not in known]
     places = [write] * len(todo)
     with path.open("a", encoding="utf-8") as file, process_pool(jobs, by_itself) as pool:
-        rows = map(answered, todo, places) if jobs == 1 else pool.map(answered, todo, places)
+        if jobs == 1:
+            rows: Iterator[dict[str, Any]] = map(answered, todo, places)
+        else:
+            # As they come: one that takes long keeps nobody waiting, and nothing is lost with it.
+            sent = [pool.submit(answered, trial, place) for trial, place in zip(todo, places, strict=True)]
+            rows = (each.result() for each in as_completed(sent))
         for number, row in enumerate(rows, start=1):
             file.write(json.dumps(row) + "\n")
             file.flush()

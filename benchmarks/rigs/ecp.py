@@ -152,7 +152,7 @@ def motor_attached(plain: Rig) -> Iterator[Row]:
         "What changed when the motor was attached (high spring; mass and damping left open)?",
         "+0.322 kg (cart and motor 0.891 ± 0.115 kg), 8 to 10 N s/m instead of 0.7 to 1.1",
         diagnosis,
-        remark=f"mass {mass.nominal:.3g} → {mass.value:.3g} ± {mass.std:.1g} kg; the motor drags with a level of {level:.2f} N, "
+        remark=f"mass {mass.nominal:.3g} → {mass.value:.3g} ± {mass.std:.1g} kg; its drag has a level of {level:.2f} N, "
         f"and {with_drag.value:.2g} N s/m. Viscous drag alone would be {drag.value:.2g} ± {drag.std:.1g} N s/m and leaves "
         f"{viscous.errors.noise_floor:.2f} of the signal that was fitted, the level {diagnosis.errors.noise_floor:.2f}",
     )

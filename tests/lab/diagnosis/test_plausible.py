@@ -30,3 +30,10 @@ def test_springs_hold_and_drag_brakes(cause, location, values, named):
     assert plausible(hypothesis, BAND) is named
     # Where a fit starts, nothing is decided yet.
     assert plausible(hypothesis.at(np.zeros(1)), BAND)
+
+
+@pytest.mark.parametrize(("travels", "named"), [(0.5, True), (5.0, True), (50.0, False)])
+def test_a_memory_yields_within_reach_or_is_a_spring(travels, named):
+    scale = {"stiffness": 100.0, "yield_displacement": 0.01}
+    guess = Guess({"stiffness": 10.0, "yield_displacement": 0.01 * travels}, scale)
+    assert plausible(Hypothesis.starting(EFFECTS["hysteresis"], "spring1_2", guess), BAND) is named
