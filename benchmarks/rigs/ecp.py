@@ -287,13 +287,24 @@ def checked() -> Iterator[Row]:
     raw = replace(pulses, records=(Record(record.kind, record.inputs, 560 * np.asarray(record.outputs)),))
     rig = Rig.load(RIGS / FOLDER / "one_cart.xml")
     bent = "the record stays near +4.2 and -5.1 A, where the published limits are those of other records"
-    whole = (
-        "blocks stacked by their numbers join without a step: no two samples differ by more than 80 counts"
+    series = measured(
+        f"{FOLDER}/amplitude_series_one_cart/Klow_3V_pulses", "ecp_carts/pulses_steps_one_cart.toml"
     )
+    # Sorted by name, the last block, data0010, comes before the one of 3000 samples that is called data009.
+    one = series.records[0]
+    n = one.n_samples
+    order = np.r_[0 : n - 3200, n - 200 : n, n - 3200 : n - 200]
+    inputs, outputs = np.asarray(one.inputs)[:, order], np.asarray(one.outputs)[:, order]
+    by_name = replace(series, records=(Record(one.kind, inputs, outputs),))
     cases = (
         ("current_sensor_saturation/Positive_saturation", None, "current saturates near +4.4 A", bent),
         ("current_sensor_saturation/Negative_saturation1", None, "current saturates near -10 A", bent),
-        ("amplitude_series_one_cart/Klow_3V_pulses", None, "1320 counts off for a second", whole),
+        (
+            "amplitude_series_one_cart/Klow_3V_pulses, blocks sorted by name",
+            by_name,
+            "1320 counts (0.0236 m) off for a second",
+            "stacked by their numbers, as the recipe does, the blocks join without a step",
+        ),
         (
             "pulses_steps_one_cart/pulse_kmed_nomass as counts",
             raw,
@@ -302,9 +313,8 @@ def checked() -> Iterator[Row]:
         ),
     )
     for place, recording, known, remark in cases:
-        name = "pulses_steps_one_cart" if place.startswith("amplitude") else "current_sensor_saturation"
-        found = recording or measured(f"{FOLDER}/{place}", f"ecp_carts/{name}.toml")
-        remarks = lab.check(found, rig if recording else None)
+        found = recording or measured(f"{FOLDER}/{place}", "ecp_carts/current_sensor_saturation.toml")
+        remarks = lab.check(found, rig if recording is raw else None)
         says = "; ".join(f"{r.channel or 'all'}: {r.says} ({r.check})" for r in remarks)
         yield Row("ECP, check", f"What is wrong in {place}?", known, says or "nothing", remark=remark)
 
