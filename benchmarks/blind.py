@@ -21,7 +21,7 @@ import sys
 import tempfile
 import time
 from collections.abc import Iterator
-from concurrent.futures import as_completed
+from concurrent.futures import Executor, as_completed
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
@@ -124,6 +124,16 @@ def read(path: Path) -> list[dict[str, Any]]:
     return [json.loads(line) for line in path.read_text(encoding="utf-8").splitlines() if line.strip()]
 
 
+def _as_they_come(pool: Executor, todo: list[Trial], places: list[Path | None]) -> Iterator[dict[str, Any]]:
+    """Answers in the order in which they are ready, so that one that takes long holds up no other."""
+    sent = [pool.submit(answered, trial, place) for trial, place in zip(todo, places, strict=True)]
+    try:
+        for each in as_completed(sent):
+            yield each.result()
+    finally:
+        pool.shutdown(wait=False, cancel_futures=True)
+
+
 def run(trials: list[Trial], path: Path, *, jobs: int, write: Path | None) -> None:
     """Answers the trials that the file does not have, one line each."""
     known = {json.dumps({name: row[name] for name in vars(Trial("", 0))}) for row in read(path)}
@@ -133,9 +143,7 @@ def run(trials: list[Trial], path: Path, *, jobs: int, write: Path | None) -> No
         if jobs == 1:
             rows: Iterator[dict[str, Any]] = map(answered, todo, places)
         else:
-            # As they come: one that takes long keeps nobody waiting, and nothing is lost with it.
-            sent = [pool.submit(answered, trial, place) for trial, place in zip(todo, places, strict=True)]
-            rows = (each.result() for each in as_completed(sent))
+            rows = _as_they_come(pool, todo, places)
         for number, row in enumerate(rows, start=1):
             file.write(json.dumps(row) + "\n")
             file.flush()

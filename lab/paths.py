@@ -67,7 +67,8 @@ def pushed(paths: Sequence[Path], inputs: Array, dt: float) -> list[Array]:
     for path, row in zip(paths, inputs, strict=True):
         if path.held_lag:
             share = -np.expm1(-dt / path.held_lag)
-            from lab.kernel import lagged  # slow to load, and only lagging actuators need it
+            # The compiler behind it is slow to load; SciPy's filters would be as slow once more.
+            from lab.kernel import lagged
 
             row = lagged(np.ascontiguousarray(row, dtype=float), share)
         force = np.clip(path.gain * row, -path.limit, path.limit) if _acts(path) else row

@@ -86,22 +86,23 @@ FREE = {
 }
 
 
+def levels(diagnosis: lab.Diagnosis) -> list[str]:
+    """Where the force of each spring with a memory levels off."""
+    found = [f.parameters for f in diagnosis.findings if f.effect.cause == "hysteresis"]
+    return [f"level {p['stiffness'].value * p['yield_displacement'].value:.3f} N" for p in found]
+
+
 def friction() -> Iterator[Row]:
     """Dry friction or more viscous damping?"""
     for (spring, load), names in FREE.items():
         diagnosis = free(released(*names), cart(spring, load))
-        levels = []
-        for finding in diagnosis.findings:
-            p = finding.parameters
-            if finding.effect.cause == "hysteresis":
-                levels.append(f"level {p['stiffness'].value * p['yield_displacement'].value:.3f} N")
         yield told(
             "ECP, 1 cart, released",
             f"What stops it ({spring} spring, {load:g} kg on it)?",
             "dry friction of 0.04 to 0.08 N",
             diagnosis,
             show=["damping spring1"],
-            remark="; ".join(levels),
+            remark="; ".join(levels(diagnosis)),
         )
 
 
@@ -145,14 +146,13 @@ def motor_attached(plain: Rig) -> Iterator[Row]:
     diagnosis = lab.diagnose(attached, plain, widths=open_, effects=possible)
     mass = diagnosis.calibration["mass cart1"]
     drag, with_drag = (d.calibration["damping spring1"] for d in (viscous, diagnosis))
-    law = diagnosis.findings[0].parameters
-    level = law["stiffness"].value * law["yield_displacement"].value
+    level = "; ".join(levels(diagnosis))
     yield told(
         "ECP, 1 cart, released",
         "What changed when the motor was attached (high spring; mass and damping left open)?",
         "+0.322 kg (cart and motor 0.891 ± 0.115 kg), 8 to 10 N s/m instead of 0.7 to 1.1",
         diagnosis,
-        remark=f"mass {mass.nominal:.3g} → {mass.value:.3g} ± {mass.std:.1g} kg; its drag has a level of {level:.2f} N, "
+        remark=f"mass {mass.nominal:.3g} → {mass.value:.3g} ± {mass.std:.1g} kg; drag: {level}, "
         f"and {with_drag.value:.2g} N s/m. Viscous drag alone would be {drag.value:.2g} ± {drag.std:.1g} N s/m and leaves "
         f"{viscous.errors.noise_floor:.2f} of the signal that was fitted, the level {diagnosis.errors.noise_floor:.2f}",
     )

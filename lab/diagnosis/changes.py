@@ -11,7 +11,7 @@ import numpy as np
 
 from identification.progress import UNHEARD, Work
 from identification.recording import Array
-from lab.diagnosis.fit import Fit, fit, objective, theta_slopes, weights
+from lab.diagnosis.fit import Fit, finite, fit, objective, theta_slopes, weights
 from lab.diagnosis.misfit import Hypothesis, Misfit
 from lab.diagnosis.starts import best_starts
 from lab.effects import EFFECTS
@@ -32,7 +32,7 @@ WORTH = 20.0
 """-2 log posterior that a trial value must gain to be followed."""
 FOLLOWED = 4
 RESTARTS = 4
-"""Steps by which the start of a free decay is adapted to laws of force, which its first estimate leaves out."""
+"""Steps by which the start of a record is adapted to laws of force, which its first estimate leaves out."""
 FAR = 4.0
 """Widths beyond which a parameter may have gone to make up for a cause, which then shows better from the model as given."""
 
@@ -147,15 +147,16 @@ def _level(misfit: Misfit, present: Fit, theta: Array, causes: Sequence[Hypothes
 
 def _started_again(misfit: Misfit, present: Fit, level: float, theta: Array) -> tuple[float, Array]:
     """-2 log posterior and parameters with starts that suit them, the laws of force acting, too."""
-    starts = range(misfit.parameters.n_factors, misfit.parameters.n)
-    P = misfit.parameters.precision[starts.start :, starts.start :]
-    for _ in range(RESTARTS):
+    unknown = range(misfit.parameters.n_factors, misfit.parameters.n)
+    P = misfit.parameters.precision[unknown.start :, unknown.start :]
+    for _ in range(RESTARTS if np.isfinite(level) else 0):
         e = misfit.residual(theta, present.causes, observer=present.observer)
         w = weights(e, misfit.colour)[:, None]
-        J = theta_slopes(misfit, theta, present.causes, present.observer, e, None, starts)
+        J = finite(theta_slopes(misfit, theta, present.causes, present.observer, e, None, unknown))
         A = (J * w).reshape(len(J), -1)
-        moved = theta.copy()
-        moved[starts] -= np.linalg.solve(A @ A.T + P, A @ (e * w).ravel() + P @ theta[starts])
+        moved, gradient = theta.copy(), A @ (e * w).ravel() + P @ theta[unknown]
+        # Two unknowns of a start may have one response.
+        moved[unknown] -= np.linalg.lstsq(A @ A.T + P, gradient, rcond=1e-10)[0]
         reached = _level(misfit, present, moved, present.causes)
         if not reached < level:
             break

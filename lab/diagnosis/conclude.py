@@ -13,7 +13,7 @@ from lab.diagnosis import words
 from lab.diagnosis.baseline import Baseline
 from lab.diagnosis.candidate import Candidate
 from lab.diagnosis.check import check
-from lab.diagnosis.evidence import ratio_spread
+from lab.diagnosis.evidence import undecided
 from lab.diagnosis.gain import errors_of, held_out, noise_floor, predicted, predictions_of
 from lab.diagnosis.misfit import Misfit
 from lab.diagnosis.noise import noise_of
@@ -24,6 +24,7 @@ from lab.diagnosis.outcome import (
     Alternative,
     Calibrated,
     Diagnosis,
+    Errors,
     Finding,
     Quantity,
 )
@@ -147,7 +148,7 @@ def conclude(
         warnings.append(words.left_over(left, recording))
     errors = errors_of(predictions, floor)
     # A baseline excuses what is left; then the data kept aside must tell whether what was named explains anything.
-    if known is not None and findings and errors.extended > errors.calibrated:
+    if known is not None and findings and not predicts(errors):
         verdict = UNEXPLAINED
         warnings.append(words.no_gain(errors))
     if refused is not None:
@@ -170,6 +171,11 @@ def conclude(
         noise=noise_of(state.fit.residual, recording),
         unlearnable=(*check(recording, nominal), *unlearnable(state.misfit, state.fit)),
     )
+
+
+def predicts(errors: Errors) -> bool:
+    """Whether the extended model predicts the data kept aside better than the calibrated one, and than nothing at all."""
+    return errors.extended < min(errors.calibrated, 1.0)
 
 
 def extended_rig(state: State, rig: Rig) -> Rig:
@@ -203,9 +209,9 @@ def _alternatives(first: Sequence[Candidate], colour: float) -> tuple[Alternativ
     found = []
     for c in first[1:6]:
         if c.gain > 0:
-            # Noise is part of the evidence; a model that errs otherwise than by noise leaves more to chance.
-            spread = ratio_spread(told.fit, c.fit, colour) if colour > 1 else 0.0
-            advice = words.advice(told.cause, c.cause, 0.5 * (told.gain - c.gain), spread)
+            # Only a baseline teaches a colour; white errors the evidence knows already.
+            chance = undecided(told.fit, c.fit, colour) if colour > 1 else 0.0
+            advice = words.advice(told.cause, c.cause, 0.5 * (told.gain - c.gain), chance)
             found.append(Alternative(c.cause, c.location, 0.5 * c.gain, advice))
     return tuple(found)
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import scipy.linalg
+import scipy.special
 
 from identification.recording import Array
 from lab.diagnosis.fit import Fit
@@ -15,6 +16,8 @@ DOUBT = float(np.log(2))
 
 STRETCH = 4
 """Length of the stretches of time that count as independent, in samples that count as one."""
+LEVEL = 0.05
+"""Probability that two fits that are as good as each other seem not to be."""
 
 
 def minus_two_log_evidence(fit: Fit, *, free: Array | None = None) -> float:
@@ -56,11 +59,12 @@ def minus_two_log_evidence(fit: Fit, *, free: Array | None = None) -> float:
     return float(best + variables * np.log(total))
 
 
-def ratio_spread(told: Fit, other: Fit, colour: float) -> float:
-    """Standard deviation of the log likelihood ratio of two fits of the same data, told by its parts over time.
+def undecided(told: Fit, other: Fit, colour: float) -> float:
+    """Log likelihood ratio of two fits of the same data that chance exceeds once in twenty, told by its parts over time.
 
     Where models err by more than noise, errors decide between causes that are both wrong somewhere (Vuong 1989, Econometrica
-    57, 307-333, section 4; over stretches of time instead of samples, as errors stay alike for a while).
+    57, 307-333, section 4; over stretches of time instead of samples, as errors stay alike for a while, and by Student's
+    distribution, as a short record has few of them).
 
     Args:
         told, other: fits, with residuals (n_outputs, n).
@@ -73,7 +77,7 @@ def ratio_spread(told: Fit, other: Fit, colour: float) -> float:
     share = (b - a).sum(axis=0) / (2 * colour)
     n_parts = max(share.size // int(np.ceil(STRETCH * colour)), 2)
     parts = np.array([part.sum() for part in np.array_split(share, n_parts)])
-    return float(np.sqrt(n_parts) * parts.std(ddof=1))
+    return float(scipy.special.stdtrit(n_parts - 1, 1 - LEVEL / 2) * np.sqrt(n_parts) * parts.std(ddof=1))
 
 
 def _of_parameters(information: Array, n: int) -> Array:

@@ -135,7 +135,7 @@ def _kinked(misfit: Misfit, theta: Array, causes: Sequence[Hypothesis]) -> bool:
     return any(law.kind in KINKED for law in misfit.plant(theta, causes).laws)
 
 
-def _known(slopes: Array) -> Array:
+def finite(slopes: Array) -> Array:
     """Slopes with zeros where a step to the side diverges: nothing is known of that variable and it stays."""
     known = np.all(np.isfinite(slopes), axis=(1, 2))
     return slopes if np.all(known) else np.where(known[:, None, None], slopes, 0.0)
@@ -145,7 +145,7 @@ class _Linear:
     """Slopes of the parameters and what they have in common, channel by channel, for as long as the slopes are kept."""
 
     def __init__(self, slopes: Array) -> None:
-        slopes = _known(slopes)
+        slopes = finite(slopes)
         self.rows = slopes.reshape(len(slopes), slopes.shape[1] * slopes.shape[2])
         # (n_outputs, n_parameters, n_parameters)
         self.products = np.matmul(slopes.transpose(1, 0, 2), slopes.transpose(1, 2, 0))
@@ -216,7 +216,7 @@ def fit(
         fresh = age == 0
         age += 1
         w = weights(e, misfit.colour)
-        own = _known(cause_slopes(misfit, theta, causes, observer, e, n_train))
+        own = finite(cause_slopes(misfit, theta, causes, observer, e, n_train))
         information, g = linear.beside(own, e, w)
         H = information + prior
         g = g + prior[:, :n] @ theta

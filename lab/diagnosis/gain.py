@@ -82,11 +82,14 @@ def errors_of(predictions: Sequence[Prediction], floor: float) -> Errors:
 
 
 def relative_error(pairs: Sequence[tuple[Array, Array]]) -> float:
-    """RMS over channels of RMS error over RMS signal; missing samples left out."""
+    """RMS over channels of RMS error over RMS signal; missing samples, and channels without any other, left out."""
     measured = np.concatenate([a for a, _ in pairs], axis=1)
     predicted = np.concatenate([b for _, b in pairs], axis=1)
-    power = np.nanmean((measured - predicted) ** 2, axis=1)
-    signal = np.nanmean(measured**2, axis=1)
+    there = ~np.all(np.isnan(measured), axis=1)
+    if not np.any(there):
+        return float("nan")
+    power = np.nanmean((measured[there] - predicted[there]) ** 2, axis=1)
+    signal = np.nanmean(measured[there] ** 2, axis=1)
     return float(np.sqrt(np.mean(power / np.where(signal > 0, signal, 1.0))))
 
 

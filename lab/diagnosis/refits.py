@@ -171,7 +171,10 @@ def steadied(calibration: Calibration, candidates: list[Candidate], without: flo
     theta, causes, share = guided.theta, guided.causes, calibration.share
     steps = np.geomspace(share / 10, NEGLIGIBLE, max(int(2 * np.log10(share / 10 / NEGLIGIBLE)), 0) + 1)
     for share in steps:
-        observer = kalman_gain(misfit, theta, share)
+        try:
+            observer = kalman_gain(misfit, theta, share)
+        except np.linalg.LinAlgError:
+            return candidates
         led_on = tried(misfit, theta, causes, observer, iterations=8, tolerance=5)
         if led_on is None:
             return candidates

@@ -48,9 +48,9 @@ def says(effect: Effect, quantities: Mapping[str, Quantity]) -> str:
     return f"{named} ({kind[:1].lower()}{kind[1:]})."
 
 
-def advice(told: str, other: str, gap: float, spread: float = 0.0) -> str:
-    """Which measurement tells two causes apart, when the data hardly do: their evidence within e⁵ or two of its spreads."""
-    if gap > max(5, 2 * spread):
+def advice(told: str, other: str, gap: float, chance: float = 0.0) -> str:
+    """Which measurement tells two causes apart, when the data hardly do: their evidence within e⁵, or within chance."""
+    if gap > max(5, chance):
         return ""
     measurement = ALIKE.get(
         frozenset({told, other}), "repeat the test with another input, level or one more sensor"

@@ -66,7 +66,10 @@ class MissingSpring(Effect):
 
     def _row(self, rig: Rig) -> np.ndarray:
         """Extension of the new spring per displacement."""
-        return _row_of(rig, self.location)
+        a, _, b = self.location.partition("|")
+        for name in (a, b):
+            self.require(name, (WORLD, *rig.bodies), "body")
+        return _row_of(rig, a, b)
 
     @classmethod
     def places(cls, rig: Rig) -> tuple[str, ...]:
@@ -80,14 +83,12 @@ class MissingSpring(Effect):
 
 
 @lru_cache(maxsize=4096)
-def _row_of(rig: Rig, location: str) -> np.ndarray:
-    a, _, b = location.partition("|")
+def _row_of(rig: Rig, a: str, b: str) -> np.ndarray:
     turns = _straight(rig, a, b)
     if turns is not None:
         return np.array([turns.get(name, 0.0) for name in rig.dofs])
-    (here, J), (there, other) = (_motion(rig)[body] for body in (a, b))
-    along = there - here
-    return np.asarray(along @ (other - J) / np.linalg.norm(along))
+    length, rate = _line(rig, a, b)
+    return rate / length
 
 
 def _lone_slide(rig: Rig, body: str) -> tuple[str, np.ndarray] | None:
@@ -131,19 +132,7 @@ def _fixed(rig: Rig, turns: dict[str, float]) -> ET.Element:
 
 def _spatial(rig: Rig, a: str, b: str) -> tuple[Rig, ET.Element]:
     """A spatial tendon between the origins of two bodies, at rest where they rest."""
-    if WORLD in (a, b):
-        raise LabError(
-            f"missing_spring at '{a}|{b}': the body can move in several directions, so a spring to the ground has none; name "
-            "two bodies"
-        )
-    data = mujoco.MjData(rig.model)
-    data.qpos[:] = rig.operating_point
-    mujoco.mj_kinematics(rig.model, data)
-    length = float(np.linalg.norm(np.subtract(*(data.xpos[body_number(rig, body)] for body in (a, b)))))
-    if length == 0:
-        raise LabError(
-            f"missing_spring at '{a}|{b}': the bodies share their origin, so the spring has no direction"
-        )
+    length, _ = _line(rig, a, b)
 
     def edit(root: ET.Element) -> None:
         for body in (a, b):
@@ -155,6 +144,23 @@ def _spatial(rig: Rig, a: str, b: str) -> tuple[Rig, ET.Element]:
     for body in (a, b):
         ET.SubElement(tendon, "site", site=f"origin@{body}")
     return rig.edited(edit), tendon
+
+
+def _line(rig: Rig, a: str, b: str) -> tuple[float, np.ndarray]:
+    """Length of the line between the origins of two bodies, and its rate per displacement times that length."""
+    if WORLD in (a, b):
+        raise LabError(
+            f"missing_spring at '{a}|{b}': the body can move in several directions, so a spring to the ground has none; name "
+            "two bodies"
+        )
+    (here, J), (there, other) = (_motion(rig)[body] for body in (a, b))
+    along = there - here
+    length = float(np.linalg.norm(along))
+    if length == 0:
+        raise LabError(
+            f"missing_spring at '{a}|{b}': the bodies share their origin, so the spring has no direction"
+        )
+    return length, along @ (other - J)
 
 
 def _possible(rig: Rig, pair: str) -> bool:

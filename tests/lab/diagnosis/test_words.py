@@ -20,8 +20,8 @@ def test_advice_where_the_evidence_is_close_and_nowhere_else():
 
 
 def test_advice_where_the_evidence_is_no_more_certain_than_chance():
-    assert advice("cubic_stiffness", "gap_contact", 9.0, spread=4.4) == ""
-    assert advice("cubic_stiffness", "gap_contact", 9.0, spread=4.6) != ""
+    assert advice("cubic_stiffness", "gap_contact", 9.0, chance=8.9) == ""
+    assert advice("cubic_stiffness", "gap_contact", 9.0, chance=9.1) != ""
 
 
 def test_a_name_without_gain_says_both_errors():
