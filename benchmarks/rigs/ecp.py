@@ -159,7 +159,11 @@ def motor_attached(plain: Rig) -> Iterator[Row]:
     both = "two changes at once; a release tells the frequency, which one alone may give"
     for name, known, remark in (
         ("Hard_2mass", "+0.986 kg on cart 1", ""),
-        ("Low_nomass", "spring 0.25 times as stiff", "the small last swings are kept aside"),
+        (
+            "Low_nomass",
+            "spring 0.25 times as stiff",
+            "right, but the small last swings, kept aside, are not predicted",
+        ),
         ("Med_2mass", "+0.986 kg, spring 0.44 times as stiff", both),
     ):
         changed = free(released(name, folder=ATTACHED), diagnosis.extended, attached)
