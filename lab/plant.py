@@ -8,7 +8,7 @@ reference; the tests hold one against the other.
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from functools import cached_property
+from functools import cached_property, lru_cache
 
 import numpy as np
 import scipy.linalg
@@ -109,8 +109,29 @@ class Plant:
 
 
 @dataclass(frozen=True, eq=False)
+class Transition:
+    """Matrices of the kernel, F, G, P, Q, X, V, S, T, R, at, C, D and E, and pairs of the states they act on."""
+
+    matrices: tuple[Array, ...]
+
+    @cached_property
+    def pairs(self) -> Pairs | None:
+        """Pairs of states; None where they are not told apart."""
+        return pairs_of(self.matrices[0])
+
+    @cached_property
+    def paired(self) -> tuple[Array, ...]:
+        """The matrices for states in pairs; no rows stand for the transition."""
+        _, G, P, Q, X, V, S, T, R, at, C, D, E = self.matrices
+        assert self.pairs is not None
+        shapes, inverse = self.pairs.shapes, self.pairs.inverse
+        matrices = (NO_OBSERVER, inverse @ G, inverse @ P, inverse @ Q, X @ shapes, V @ shapes, S @ shapes)
+        return (*matrices, T, R, at, C @ shapes, D, E)
+
+
+@dataclass(frozen=True, eq=False)
 class Responder:
-    """A plant made ready for one sample time: matrices of the kernel.
+    """A plant made ready for one sample time.
 
     The state holds q, q̇, then one value per lagging input and per lagging output.
     """
@@ -118,9 +139,14 @@ class Responder:
     plant: Plant
     dt: float
     substeps: int
-    matrices: tuple[Array, ...]  # F, G, P, Q, X, V, S, T, R, at, C, D, E
+    transition: Transition
     laws: np.ndarray
     parameters: Array
+
+    @property
+    def matrices(self) -> tuple[Array, ...]:
+        """Matrices of the kernel."""
+        return self.transition.matrices
 
     def outputs(
         self,
@@ -154,9 +180,9 @@ class Responder:
         if initial is not None:
             state[: initial.size] = initial
         matrices, products = self.matrices, n_samples * self.matrices[1].shape[0] * n_states**2
-        paired = self._pairs if products > WORTH_PAIRING else None
+        paired = self.transition.pairs if products > WORTH_PAIRING else None
         if paired is not None:
-            matrices, state = self._paired_matrices, paired.inverse @ state
+            matrices, state = self.transition.paired, paired.inverse @ state
             observer = paired.inverse @ observer if observer.size else observer
         y = np.zeros((0, 0))
         if measured is not None and observer.size:
@@ -178,19 +204,6 @@ class Responder:
             )
         return recorded(plant.output_paths, plant.order, np.ascontiguousarray(out.T), self.dt)
 
-    @cached_property
-    def _pairs(self) -> Pairs | None:
-        return pairs_of(self.matrices[0])
-
-    @cached_property
-    def _paired_matrices(self) -> tuple[Array, ...]:
-        """The matrices for states in pairs; no rows stand for the transition."""
-        _, G, P, Q, X, V, S, T, R, at, C, D, E = self.matrices
-        assert self._pairs is not None
-        shapes, inverse = self._pairs.shapes, self._pairs.inverse
-        matrices = (NO_OBSERVER, inverse @ G, inverse @ P, inverse @ Q, X @ shapes, V @ shapes, S @ shapes)
-        return (*matrices, T, R, at, C @ shapes, D, E)
-
     def _driven(self, inputs: Array) -> Array:
         """Inputs of the kernel, (n_samples, n_inputs): forces of the actuators, then of tones."""
         columns = pushed(self.plant.input_paths, inputs, self.dt)
@@ -203,8 +216,45 @@ class Responder:
 
 def ready(plant: Plant, dt: float, *, substeps: int = 6) -> Responder:
     """The plant ready to respond at sample time `dt` [s]; `substeps` per sample where there are laws."""
-    n, n_in, n_out = plant.n_dofs, len(plant.inputs), len(plant.outputs)
     sub = substeps if plant.laws else 1
+    parameters = np.zeros((len(plant.laws), 3))
+    for i, law in enumerate(plant.laws):
+        parameters[i, : len(law.parameters)] = law.parameters
+    kinds = np.array([law.kind for law in plant.laws], dtype=np.int64)
+    return Responder(plant, dt, sub, _transition(_Asked(plant, dt, sub)), kinds, parameters)
+
+
+class _Asked:
+    """A plant, as far as its transition depends on it: laws of other sizes at the same place share one."""
+
+    def __init__(self, plant: Plant, dt: float, sub: int) -> None:
+        self.plant, self.dt, self.sub = plant, dt, sub
+        structure = (plant.mass, plant.damping, plant.stiffness, plant.forces)
+        readings = (plant.displacement, plant.velocity, plant.acceleration)
+        self.key = (
+            *(dt, sub, len(plant.tones)),
+            *(array.tobytes() for array in (*structure, *readings)),
+            *((law.row.tobytes(), _dry(law)) for law in plant.laws),
+            *(tone.row.tobytes() for tone in plant.tones),
+            *((path.lag, path.delay) for path in (*plant.input_paths, *plant.output_paths)),
+        )
+
+    def __hash__(self) -> int:
+        return hash(self.key)
+
+    def __eq__(self, other: object) -> bool:
+        return isinstance(other, _Asked) and self.key == other.key
+
+
+def _dry(law: Law) -> bool:
+    """Whether a law is dry friction, which jumps."""
+    return law.kind == COULOMB and not law.parameters[1]
+
+
+@lru_cache(maxsize=16)
+def _transition(asked: _Asked) -> Transition:
+    plant, dt, sub = asked.plant, asked.dt, asked.sub
+    n, n_in, n_out = plant.n_dofs, len(plant.inputs), len(plant.outputs)
     rows = np.array([law.row for law in plant.laws]).reshape(-1, n)
     tones = np.array([tone.row for tone in plant.tones]).reshape(-1, n)
     # Accelerations from displacement, velocity, inputs, tones and laws.
@@ -242,19 +292,14 @@ def ready(plant: Plant, dt: float, *, substeps: int = 6) -> Responder:
     G = np.stack(
         [_inputs_over(A, B, step * dt / sub, dt / sub, changes) if changes else held for step in range(sub)]
     )
-    dry = [i for i, law in enumerate(plant.laws) if law.kind == COULOMB and not law.parameters[1]]
+    dry = [i for i, law in enumerate(plant.laws) if _dry(law)]
     Q[:, dry] += P[:, dry]
     P[:, dry] = 0.0
     X, V = np.zeros((len(rows), b)), np.zeros((len(rows), b))
     X[:, :n], V[:, n : 2 * n] = rows, rows
     S, T, R = V @ A, V @ _acting(B, 0.0, changes), V @ W
     at, C, D, E = _late_readings(plant, dt, sub, A, B, W, C, D, E, changes)
-    parameters = np.zeros((len(rows), 3))
-    for i, law in enumerate(plant.laws):
-        parameters[i, : len(law.parameters)] = law.parameters
-    matrices = tuple(np.ascontiguousarray(m) for m in (F, G, P, Q, X, V, S, T, R, at, C, D, E))
-    kinds = np.array([law.kind for law in plant.laws], dtype=np.int64)
-    return Responder(plant, dt, sub, matrices, kinds, parameters)
+    return Transition(tuple(np.ascontiguousarray(m) for m in (F, G, P, Q, X, V, S, T, R, at, C, D, E)))
 
 
 def _late_readings(
