@@ -123,12 +123,12 @@ def _yielding(p, z, dx):  # type: ignore[no-untyped-def]
 
 
 @njit(cache=True, nogil=True, fastmath=REORDERED)
-def _stacked(A, B, C):  # type: ignore[no-untyped-def]
-    """A, B and C side by side, with rows of zeros that make their number a multiple of four."""
-    n, a, b = A.shape[0], A.shape[1], A.shape[1] + B.shape[1]
-    stacked = np.zeros((n + (-n) % 4, b + C.shape[1]))
-    stacked[:n, :a], stacked[:n, a:b], stacked[:n, b:] = A, B, C
-    return stacked
+def _in_fours(A):  # type: ignore[no-untyped-def]
+    """A matrix with rows and columns of zeros that make the number of each a multiple of four."""
+    n, m = A.shape
+    padded = np.zeros((n + (-n) % 4, m + (-m) % 4))
+    padded[:n, :m] = A
+    return padded
 
 
 @njit(cache=True, nogil=True, fastmath=REORDERED)
@@ -180,24 +180,42 @@ def respond(F, turns, G, P, Q, X, V, S, T, R, at, C, D, E, laws, params, u, x0, 
         y: measured outputs, (n_samples, n_outputs), used with an observer only; NaN where missing.
     """
     n, n_states, n_inputs, n_outputs, n_laws = u.shape[0], x0.size, u.shape[1], C.shape[0], laws.size
+    paired, substeps = F.shape[0] == 0, G.shape[0]
     # What acts: state, inputs, and forces of the laws.
-    acting = np.concatenate((x0, np.zeros(n_inputs + n_laws)))
-    x, g = acting[:n_states], acting[n_states + n_inputs :]
-    readings, last_read = _stacked(C, D, E), np.max(at)
-    paired = F.shape[0] == 0
-    moves = np.zeros((0 if paired else G.shape[0], n_states + (-n_states) % 4, acting.size))
-    for step in range(moves.shape[0]):
-        moves[step] = _stacked(F, G[step], P)
-    pushes = np.zeros((G.shape[0] if paired else 0, n_inputs + n_laws, n_states))
-    for step in range(pushes.shape[0]):
+    n_acting = n_states + n_inputs + n_laws
+    acting = np.zeros(n_acting + (-n_acting) % 4)
+    acting[:n_states] = x0
+    x, g = acting[:n_states], acting[n_states + n_inputs : n_acting]
+    readings, last_read = _in_fours(np.concatenate((C, D, E), axis=1)), np.max(at)
+    pushes = np.zeros((substeps, n_inputs + n_laws, n_states))
+    for step in range(substeps):
         pushes[step, :n_inputs], pushes[step, n_inputs:] = G[step].T, P.T
+    if paired:
+        columns, unit = np.zeros((n_states, n_states)), np.zeros(acting.size)
+        for j in range(n_states):
+            unit[:] = 0.0
+            unit[j] = 1.0
+            _turned(turns, pushes[0], unit, columns[j])
+        F = np.ascontiguousarray(columns.T)
+    # What comes of it at the end of a substep, without the forces that rise: states unless they move in pairs, then
+    # extensions of the laws and their rates.
+    first = 0 if paired else n_states
+    rows = first + 2 * n_laws
+    moves = np.zeros((substeps, rows + (-rows) % 4, acting.size))
+    for step in range(substeps):
+        every = np.concatenate((F, G[step], P), axis=1)
+        moves[step, :first, :n_acting] = every[:first]
+        moves[step, first : first + n_laws, :n_acting] = X @ every
+        moves[step, first + n_laws : rows, :n_acting] = V @ every
+    ends, reading = np.zeros(moves.shape[1]), np.zeros(readings.shape[0])
+    free = np.zeros(n_states) if paired else ends[:n_states]
+    xf, vf = ends[first : first + n_laws], ends[first + n_laws : rows]
     stuck_on = np.ascontiguousarray(Q.T)
-    free, reading = np.zeros(n_states + (-n_states) % 4), np.zeros(readings.shape[0])
     out, z = np.empty((n, n_outputs)), np.zeros(n_laws)
-    # Extensions and their rates, at the start of a substep, without laws at its end, and per force of each law.
-    xs, vs, xf, vf = np.zeros(n_laws), np.zeros(n_laws), np.zeros(n_laws), np.zeros(n_laws)
+    # Extensions and their rates at the start of a substep; and per force of each law at its end.
+    xs, vs = np.zeros(n_laws), np.zeros(n_laws)
     per_x, per_v = X @ Q, V @ Q
-    observed, substeps = L.shape[0] > 0, G.shape[0]
+    observed, pulls = L.shape[0] > 0, np.ascontiguousarray(L.T)
     dry = np.array([laws[e] == COULOMB and params[e, 1] <= 0 for e in range(n_laws)])
     stuck = np.zeros(n_laws, dtype=np.bool_)
     for e in range(n_laws):
@@ -217,11 +235,12 @@ def respond(F, turns, G, P, Q, X, V, S, T, R, at, C, D, E, laws, params, u, x0, 
                     if pull == 1:
                         # A spring with a memory remembers where measurements pull it, or its rest would wander.
                         z[e] = _yielding(params[e], z[e], xe - xs[e])
-                    g[e], xs[e] = z[e], xe
+                    g[e] = z[e]
                 elif dry[e]:
                     g[e] = params[e, 0] * np.sign(ve)
                 else:
                     g[e] = force(laws[e], params[e], xe, ve, s)
+                xs[e], vs[e] = xe, ve
             if any_dry:
                 _stick(S, T, R, x, u[k], laws, params, stuck, g)
             if pull == 1:
@@ -236,7 +255,7 @@ def respond(F, turns, G, P, Q, X, V, S, T, R, at, C, D, E, laws, params, u, x0, 
                     error = y[k, i] - out[k, i] if at[i] == 0 else np.nan
                     if error == error:
                         for j in range(n_states):
-                            x[j] += L[j, i] * error
+                            x[j] += pulls[i, j] * error
         for step in range(substeps):
             s = (k + (step + 1) / substeps) / n_record
             if step > 0 and step <= last_read:
@@ -246,16 +265,7 @@ def respond(F, turns, G, P, Q, X, V, S, T, R, at, C, D, E, laws, params, u, x0, 
                         out[k, i] = reading[i]
             if paired:
                 _turned(turns, pushes[step], acting, free)
-            else:
-                _product(moves[step], acting, free)
-            for e in range(n_laws):
-                a, b, c, d = 0.0, 0.0, 0.0, 0.0
-                for j in range(n_states):
-                    a += X[e, j] * x[j]
-                    b += V[e, j] * x[j]
-                    c += X[e, j] * free[j]
-                    d += V[e, j] * free[j]
-                xs[e], vs[e], xf[e], vf[e] = a, b, c, d
+            _product(moves[step], acting, ends)
             # With several laws, each is solved in turn given the others, until none moves.
             for _ in range(1 if n_laws <= 1 else 12):
                 moved = 0.0
@@ -300,14 +310,20 @@ def respond(F, turns, G, P, Q, X, V, S, T, R, at, C, D, E, laws, params, u, x0, 
             for e in range(n_laws):
                 for j in range(n_states):
                     free[j] += stuck_on[e, j] * g[e]
-            lost = 0
+            for e in range(n_laws):
+                xs[e], vs[e] = xf[e], vf[e]
+                for other in range(n_laws):
+                    xs[e] += per_x[e, other] * g[other]
+                    vs[e] += per_v[e, other] * g[other]
             for j in range(n_states):
                 x[j] = free[j]
-                lost += not abs(free[j]) < 1e100
-            if lost:
-                out[k + 1 :] = np.nan
-                for i in range(n_outputs):
-                    if at[i] > step:
-                        out[k, i] = np.nan
-                return out
+        gone = 0
+        for j in range(n_states):
+            gone += not abs(x[j]) < 1e100
+        if gone:
+            out[k + 1 :] = np.nan
+            for i in range(n_outputs):
+                if at[i] > 0:
+                    out[k, i] = np.nan
+            break
     return out

@@ -57,7 +57,7 @@ def test_compiled_is_plain(names, worth, monkeypatch):
         "_rounded",
         "_stick",
         "_yielding",
-        "_stacked",
+        "_in_fours",
         "_product",
         "_turned",
         "respond",
