@@ -104,12 +104,14 @@ def shared(function: Callable[[Item], Outcome], items: Sequence[Item]) -> Iterat
             # The far end is theirs, so that outcomes come in order from this one.
             while len(waiting) > 1 and sum(not f.done() for f in sent.values()) < AHEAD * HANDS.n_helpers:
                 last = waiting.pop()
-                sent[last] = _sent(_piece, task, items[last])
-            if number in sent:
-                yield _received(sent[number], partial(function, item))
-            else:
+                sent[last] = _sent(_piece, task, last, items[last])
+            if number not in sent:
                 waiting.popleft()
                 yield _alone(function, item)
+            elif _is_first(task, number):
+                yield _alone(function, item)
+            else:
+                yield _received(sent[number], partial(function, item))
     finally:
         Path(task).unlink(missing_ok=True)
 
@@ -173,8 +175,19 @@ def _load(modules: Sequence[str]) -> None:
         importlib.import_module(module)
 
 
-def _piece(path: str, item: Any) -> Any:
-    return _told(path)(item)
+def _piece(task: str, number: int, item: Any) -> Any:
+    if not _is_first(task, number):
+        raise RuntimeError("another process has begun it")
+    return _told(task)(item)
+
+
+def _is_first(task: str, number: int) -> bool:
+    """Whether this process is the first to begin an item; the file that says so stays, for those who come late."""
+    try:
+        os.close(os.open(f"{task}.{number}", os.O_CREAT | os.O_EXCL))
+    except OSError:
+        return False
+    return True
 
 
 @lru_cache(maxsize=1)

@@ -58,6 +58,18 @@ def shared_by_one():
     return len({process for _, process in shared(where, range(4))}) < 2
 
 
+def slow_first(item):
+    time.sleep(0.5 if item == 3 else 0.01)
+    return item, os.getpid()
+
+
+def test_nobody_waits_for_what_is_not_begun(helper):
+    outcomes = list(shared(slow_first, range(4)))
+    assert [item for item, _ in outcomes] == list(range(4))
+    # The helper begins at the far end, which takes it longer than all others take this process.
+    assert [process == os.getpid() for _, process in outcomes] == [True, True, True, False]
+
+
 def test_without_helpers_all_is_done_here(nobody):
     assert {process for _, process in shared(where, range(3))} == {os.getpid()}
     assert meanwhile(where, 1)() == (1, os.getpid())
