@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import gc
 import multiprocessing
 import os
 import signal
@@ -16,11 +17,12 @@ LIBRARIES = ("OMP", "OPENBLAS", "MKL")
 def process_pool(n: int, begin: Callable[[], None] | None = None) -> ProcessPoolExecutor:
     """Fresh processes, which share nothing with this one; each begins with `begin`, and ends when this one does."""
     spawn = multiprocessing.get_context("spawn")
-    return ProcessPoolExecutor(n, mp_context=spawn, initializer=_settle, initargs=(begin,))
+    return ProcessPoolExecutor(n, mp_context=spawn, initializer=_settle, initargs=(begin, gc.get_threshold()))
 
 
-def _settle(begin: Callable[[], None] | None) -> None:
-    """Makes a worker leave stopping to its parent, and leave with it."""
+def _settle(begin: Callable[[], None] | None, threshold: tuple[int, int, int]) -> None:
+    """Makes a worker leave stopping to its parent, leave with it, and look for garbage as often."""
+    gc.set_threshold(*threshold)
     if begin is not None:
         begin()
     signal.signal(signal.SIGINT, signal.SIG_IGN)
