@@ -14,7 +14,7 @@ from lab.diagnosis.baseline import Baseline
 from lab.diagnosis.candidate import Candidate
 from lab.diagnosis.check import check
 from lab.diagnosis.evidence import undecided
-from lab.diagnosis.gain import errors_of, held_out, noise_floor, predicted, predictions_of
+from lab.diagnosis.gain import errors_of, held_out, noise_floor, predictions_of
 from lab.diagnosis.misfit import Misfit
 from lab.diagnosis.noise import noise_of
 from lab.diagnosis.outcome import (
@@ -131,7 +131,6 @@ def conclude(
         misfit,
         (nominal, calibrated, extended),
         starts,
-        expected=predicted(misfit, state.fit),
         accuracy=accuracy_below(floor),
         work=work,
     )

@@ -13,9 +13,12 @@ from lab.diagnosis.fit import Fit
 from lab.diagnosis.misfit import Misfit
 from lab.diagnosis.outcome import Errors, Prediction
 from lab.diagnosis.starts import start_of
+from lab.errors import LabError
 from lab.hands import shared
+from lab.plant import ready
 from lab.replay import replay
 from lab.rig import Rig
+from lab.twin import twin
 
 PAST = 30
 """Samples of its own past from which a residual is predicted, to tell noise from what is not noise."""
@@ -27,7 +30,6 @@ def predictions_of(
     rigs: Sequence[Rig],
     starts: Sequence[Sequence[Array | None]],
     *,
-    expected: Sequence[Array],
     accuracy: float,
     work: Work = UNHEARD,
 ) -> tuple[Prediction, ...]:
@@ -38,14 +40,13 @@ def predictions_of(
         misfit: of the nominal rig.
         rigs: nominal, calibrated, extended.
         starts: for each of them, the motion at the start of each record, as the nominal rig has it.
-        expected: outputs of the extended rig by the fast twin, one array per record.
         accuracy: of the simulation.
         work: told of every rig.
     """
     # Never in two threads: MuJoCo's callbacks belong to the whole process.
     simulated = shared(
-        partial(_simulated, recording, rigs[0].dofs, accuracy),
-        list(zip(rigs, starts, (None, None, expected), strict=True)),
+        partial(_simulated, recording, rigs[0].dofs, accuracy, misfit.substeps),
+        list(zip(rigs, starts, strict=True)),
     )
     return tuple(
         Prediction(measured, nominal, calibrated, extended, first)
@@ -59,12 +60,31 @@ def _simulated(
     recording: Recording,
     dofs: tuple[str, ...],
     accuracy: float,
-    driven: tuple[Rig, Sequence[Array | None], Sequence[Array] | None],
+    substeps: int,
+    driven: tuple[Rig, Sequence[Array | None]],
 ) -> list[Array]:
-    """Outputs of a rig that starts each record as told in terms of `dofs`, by MuJoCo; the last are those expected."""
-    rig, begins, expected = driven
+    """Outputs of a rig that starts each record as told in terms of `dofs`, by MuJoCo."""
+    rig, begins = driven
     motions = [None if start is None else start_of(rig, dofs, start) for start in begins]
+    # Where its own twin agrees, MuJoCo needs no finer steps to show that they are fine enough.
+    expected = _by_the_twin(rig, recording, motions, substeps)
     return replay(rig, recording, accuracy=accuracy, starts=motions, expected=expected)
+
+
+def _by_the_twin(
+    rig: Rig, recording: Recording, motions: Sequence[tuple[Array, Array] | None], substeps: int
+) -> list[Array] | None:
+    """Outputs of a rig by its twin; None where it has none."""
+    try:
+        responder = ready(twin(rig).plant, recording.dt, substeps=substeps)
+    except LabError:
+        return None
+    return [
+        responder.outputs(
+            record.inputs[:, :], record.n_samples, initial=None if motion is None else np.concatenate(motion)
+        )
+        for record, motion in zip(recording.records, motions, strict=True)
+    ]
 
 
 def errors_of(predictions: Sequence[Prediction], floor: float) -> Errors:
