@@ -167,6 +167,8 @@ def _started_again(misfit: Misfit, present: Fit, level: float, theta: Array) -> 
 def _restarted(misfit: Misfit, theta: Array) -> Array:
     """The parameters with starts that suit them: those of another model fit nothing."""
     p = misfit.parameters
+    if not p.started:
+        return theta
     starts = best_starts(replace(misfit, twin=replace(misfit.twin, plant=misfit.plant(theta))))
     found = [starts[record] for record in p.started]
     return np.concatenate([theta[: p.n_factors], *found]) / np.concatenate(

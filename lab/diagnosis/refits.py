@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import partial
 
 import numpy as np
@@ -15,7 +15,7 @@ from lab.diagnosis.candidate import Candidate, last_of
 from lab.diagnosis.fit import Fit, fit, resumed, theta_slopes
 from lab.diagnosis.misfit import Hypothesis, Misfit
 from lab.diagnosis.observer import kalman_gain
-from lab.diagnosis.screening import Screened
+from lab.diagnosis.screening import Screened, coarsely
 from lab.hands import shared
 
 ROUGH = 4
@@ -46,11 +46,12 @@ def refitted(
     ]
     *leading_, rough, whole = work.parts(*[3.0 for _ in shares], 2.0, 3.0)
     # Causes are small at first: those who start together share the slopes of the model without them.
-    near = [_Near.at(misfit, theta, present, shares[0] if shares else 0.0) for theta in _starts_of(picked)]
-    for share, part in zip(shares, leading_, strict=True):
-        led = part.each(
-            shared(partial(_led, misfit, share, near), [row[:2] for row in running]), len(running)
-        )
+    # What leads far ahead does so on half the samples, too; what is close is kept.
+    coarse = coarsely(misfit, present.theta, present.causes)
+    seen = [halved(coarse)] * (len(shares) - 1) + [coarse]
+    near = [_Near.at(seen[0], theta, present, shares[0] if shares else 0.0) for theta in _starts_of(picked)]
+    for share, some, part in zip(shares, seen, leading_, strict=False):
+        led = part.each(shared(partial(_led, some, share, near), [row[:2] for row in running]), len(running))
         running = [(f.theta, f.causes, f) for f in leading([f for f in led if f is not None])]
         near = []
     roughly = shared(partial(_roughly, misfit, present.observer, near), [row[:2] for row in running])
@@ -60,6 +61,11 @@ def refitted(
     wholly = shared(partial(_wholly, misfit, present.observer), [(f.theta, f.causes) for f in kept])
     found = [(f, plain[id(start)]) for f, start in zip(whole.each(wholly, len(kept)), kept, strict=True)]
     return [(f, guided) for f, guided in found if f is not None]
+
+
+def halved(misfit: Misfit) -> Misfit:
+    """The misfit on the first half of what fits may see of every record."""
+    return replace(misfit, n_train=tuple(-(-n // 2) for n in misfit.n_train))
 
 
 @dataclass(frozen=True, eq=False)

@@ -56,6 +56,11 @@ class Screening:
         return replace(self, rows=sorted(self.rows + moved, key=lambda row: -row.score))
 
 
+def coarsely(misfit: Misfit, theta: Array, present: Sequence[Hypothesis]) -> Misfit:
+    """The misfit with as few substeps as rank causes, where no law is present that they must not be mistaken for."""
+    return misfit if misfit.plant(theta, present).laws else replace(misfit, substeps=SCREEN_SUBSTEPS)
+
+
 def hypotheses(misfit: Misfit, effects: Mapping[str, type[Effect]]) -> list[Hypothesis]:
     """Every cause at every place from every starting value."""
     survey = misfit.survey
@@ -95,9 +100,7 @@ def screen(
     """
     most = int(share * min(SCREEN_SAMPLES, SCREEN_VALUES // misfit.measured.shape[0]))
     n_train = tuple(min(n, most) for n in misfit.n_train)
-    if not misfit.plant(theta, present).laws:
-        misfit = replace(misfit, substeps=SCREEN_SUBSTEPS)
-    glance = Glance.beside(misfit, theta, tuple(present), observer, n_train)
+    glance = Glance.beside(coarsely(misfit, theta, present), theta, tuple(present), observer, n_train)
     looking, following = work.parts(len(proposed), 2 * STEPPED_ON)
     pieces = [proposed[i : i + AT_ONCE] for i in range(0, len(proposed), AT_ONCE)]
     looks = [look for some in looking.each(shared(glance.looks, pieces), len(pieces)) for look in some]
