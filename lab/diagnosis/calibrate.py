@@ -15,7 +15,8 @@ from lab.diagnosis.observer import kalman_gain
 from lab.diagnosis.starts import best_starts, moving, starts_of, with_starts
 from lab.diagnosis.whiteness import whiteness
 from lab.effects.survey import Survey
-from lab.plant import Path, ready
+from lab.plant import Path
+from lab.responder import ready
 from lab.rig import Rig
 from lab.twin import Twin
 

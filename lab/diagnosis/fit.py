@@ -11,7 +11,7 @@ from identification.recording import Array
 from lab.diagnosis.misfit import Hypothesis, Misfit
 from lab.forces import KINKED
 from lab.hands import beside
-from lab.plant import NO_OBSERVER
+from lab.responder import NO_OBSERVER
 
 STEP, KINKED_STEP, CAUSE_STEP = 1e-3, 3e-2, 1e-3
 """Difference steps: in widths of the prior, so small that valleys are followed, but wide enough to see past the jags that kinks

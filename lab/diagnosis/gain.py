@@ -15,8 +15,8 @@ from lab.diagnosis.outcome import Errors, Prediction
 from lab.diagnosis.starts import start_of
 from lab.errors import LabError
 from lab.hands import shared
-from lab.plant import ready
 from lab.replay import replay
+from lab.responder import ready
 from lab.rig import Rig
 from lab.twin import twin
 

@@ -13,7 +13,8 @@ import scipy.linalg
 from identification.recording import Array, Record, Recording
 from lab.effects.effect import Effect
 from lab.effects.survey import Guess, Survey
-from lab.plant import NO_OBSERVER, Plant, ready
+from lab.plant import Plant
+from lab.responder import NO_OBSERVER, ready
 from lab.twin import Twin
 
 ENERGY = 0.98

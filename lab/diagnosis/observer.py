@@ -7,7 +7,7 @@ import scipy.linalg
 
 from identification.recording import Array
 from lab.diagnosis.misfit import Misfit
-from lab.plant import NO_OBSERVER, ready
+from lab.responder import NO_OBSERVER, ready
 
 
 def kalman_gain(misfit: Misfit, theta: Array, force_share: float, *, noise_share: float = 0.01) -> Array:

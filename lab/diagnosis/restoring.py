@@ -19,7 +19,8 @@ from identification.recording import Array, Channel, Recording
 from lab.diagnosis.outcome import Diagnosis, Finding
 from lab.errors import LabError
 from lab.paths import Path
-from lab.plant import Plant, ready
+from lab.plant import Plant
+from lab.responder import ready
 from lab.twin import spring_rows, twin
 
 OVER = {

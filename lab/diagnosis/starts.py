@@ -11,7 +11,8 @@ from identification.recording import Array, Recording
 from lab.diagnosis.fit import Fit, weights
 from lab.diagnosis.misfit import Misfit
 from lab.paths import recorded
-from lab.plant import Plant, ready
+from lab.plant import Plant
+from lab.responder import ready
 from lab.rig import Rig
 
 LEVEL = 1e-3

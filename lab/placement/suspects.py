@@ -18,7 +18,7 @@ from lab.effects import EFFECTS
 from lab.errors import LabError, UnknownNameError
 from lab.hands import beside
 from lab.placement.plan import Plan
-from lab.plant import NO_OBSERVER
+from lab.responder import NO_OBSERVER
 from lab.rig import Rig
 from lab.twin import twin
 

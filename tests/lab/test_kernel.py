@@ -7,8 +7,8 @@ import pytest
 import scipy.linalg
 import scipy.signal
 
-from lab import forces, kernel, plant
-from lab.plant import ready
+from lab import forces, kernel
+from lab.responder import NO_OBSERVER, ready
 from lab.twin import twin
 from tests.lab.effects.cases import CASES
 from tests.lab.effects.reference import DT, EYE, SPRING, local, nominal, system
@@ -46,7 +46,7 @@ def error(found, truth):
 @pytest.mark.parametrize("worth", [0.0, np.inf])
 @pytest.mark.parametrize("names", [*((name,) for name in LAWS), ("cubic", "dry friction", "Bouc-Wen")])
 def test_compiled_is_plain(names, worth, monkeypatch):
-    monkeypatch.setattr(plant, "WORTH_PAIRING", worth)
+    monkeypatch.setattr("lab.responder.WORTH_PAIRING", worth)
     responder, u = ready(with_laws(*names), DT, substeps=4), pushes(25)
     rng = np.random.default_rng(1)
     pulled = {"observer": 1e-3 * rng.standard_normal((6, 5)), "measured": rng.standard_normal((5, 25))}
@@ -87,10 +87,10 @@ def test_a_memory_pulled_along_yields_as_its_equation_says(z, dx):
 def test_states_in_pairs_are_the_states(names, observed, monkeypatch):
     u, rng = pushes(300), np.random.default_rng(1)
     start, y = 0.1 * rng.standard_normal(6), rng.standard_normal((5, 300))
-    gain = 1e-3 * rng.standard_normal((6, 5)) if observed else plant.NO_OBSERVER
+    gain = 1e-3 * rng.standard_normal((6, 5)) if observed else NO_OBSERVER
     found = []
     for worth in (np.inf, 0.0):
-        monkeypatch.setattr(plant, "WORTH_PAIRING", worth)
+        monkeypatch.setattr("lab.responder.WORTH_PAIRING", worth)
         responder = ready(with_laws(*names), DT, substeps=4)
         found.append(responder.outputs(u, 300, initial=start, observer=gain, measured=y))
     # Shapes with a condition below a hundred here cost two digits, 1200 substeps another one or two.

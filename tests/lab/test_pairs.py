@@ -7,7 +7,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from lab.pairs import pairs_of
-from lab.plant import ready
+from lab.responder import ready
 from lab.twin import twin
 from tests.lab.effects.reference import DT, nominal
 

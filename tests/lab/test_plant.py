@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 
 from lab.effects import EFFECTS
 from lab.paths import Path, recorded, structural
-from lab.plant import ready
+from lab.responder import ready
 from lab.twin import twin
 from tests.lab.effects import reference
 from tests.lab.effects.reference import DT, forces, held, linear, local, nominal, system

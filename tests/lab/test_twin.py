@@ -9,7 +9,7 @@ import lab
 from lab.effects import EFFECTS
 from lab.effects.edits import with_mass
 from lab.errors import RigError
-from lab.plant import ready
+from lab.responder import ready
 from lab.rig import Rig
 from lab.simulate import simulate
 from lab.stages import Gain, Lag, LowPass, Saturation

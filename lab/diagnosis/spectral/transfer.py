@@ -11,7 +11,8 @@ from identification.recording import Array
 from lab import forces
 from lab.diagnosis.spectral.continuous import behind_limits, continuous_response
 from lab.diagnosis.spectral.modal_sum import modal_sum
-from lab.plant import Plant, ready
+from lab.plant import Plant
+from lab.responder import ready
 
 Complex = NDArray[np.complex128]
 

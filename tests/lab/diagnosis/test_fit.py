@@ -10,7 +10,7 @@ from lab.diagnosis.misfit import Misfit, Parameters
 from lab.effects.stiffness_change import StiffnessChange
 from lab.excitation import Random
 from lab.instruments import instrument
-from lab.plant import NO_OBSERVER
+from lab.responder import NO_OBSERVER
 from lab.rig import Rig
 from lab.simulate import simulate
 from lab.twin import twin

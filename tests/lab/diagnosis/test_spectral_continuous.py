@@ -7,7 +7,8 @@ import pytest
 
 from lab.diagnosis.spectral.motion import survey_of
 from lab.diagnosis.spectral.transfer import plant_response
-from lab.plant import Path, Tone, ready
+from lab.plant import Path, Tone
+from lab.responder import ready
 from lab.rig import Rig
 from lab.twin import twin
 

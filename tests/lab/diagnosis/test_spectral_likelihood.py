@@ -11,7 +11,7 @@ from lab.diagnosis.spectral.goodness import goodness
 from lab.diagnosis.spectral.lines import averages, bands_for, half_bandwidth, piece_length, pieces_of
 from lab.diagnosis.spectral.recorded import Recorded
 from lab.diagnosis.spectral.transfer import plant_response
-from lab.plant import ready
+from lab.responder import ready
 from lab.rig import Rig
 from lab.twin import twin
 

@@ -7,7 +7,8 @@ import pytest
 
 from lab import forces
 from lab.diagnosis.spectral.transfer import at_time, drifts, plant_response
-from lab.plant import Tone, ready
+from lab.plant import Tone
+from lab.responder import ready
 from lab.rig import Rig
 from lab.twin import twin
 

@@ -14,7 +14,8 @@ import lab
 from lab.effects import EFFECTS, Effect
 from lab.effects.survey import Survey
 from lab.errors import LabError, UnknownNameError
-from lab.plant import Plant, ready
+from lab.plant import Plant
+from lab.responder import ready
 from lab.rig import Rig
 from lab.simulate import simulate
 from lab.stepping import Stepper

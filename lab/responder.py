@@ -1,0 +1,111 @@
+"""Responder: a plant made ready for one sample time; its responses take milliseconds."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from identification.recording import Array
+from lab.paths import pushed, recorded, structural
+from lab.plant import Plant
+from lab.transition import NO_PAIRS, Transition, transition_of
+
+NO_OBSERVER = np.zeros((0, 0))
+WORTH_PAIRING = 4e6
+"""Products per response, of the transition with the state, beyond which finding pairs of states costs less than it saves."""
+
+
+@dataclass(frozen=True, eq=False)
+class Responder:
+    """A plant made ready for one sample time.
+
+    The state holds q, q̇, then one value per lagging input and per lagging output.
+    """
+
+    plant: Plant
+    dt: float
+    substeps: int
+    transition: Transition
+    laws: np.ndarray
+    parameters: Array
+
+    @property
+    def matrices(self) -> tuple[Array, ...]:
+        """Matrices of the kernel."""
+        return self.transition.matrices
+
+    def outputs(
+        self,
+        inputs: Array,
+        n_samples: int,
+        *,
+        initial: Array | None = None,
+        observer: Array = NO_OBSERVER,
+        measured: Array | None = None,
+        n_record: int | None = None,
+    ) -> Array:
+        """Recorded outputs (n_outputs, n_samples) under recorded inputs (n_inputs, n_samples or more).
+
+        Args:
+            inputs: recorded inputs, or no rows.
+            n_samples: how many samples to give.
+            initial: q and q̇ at the start; rest when None.
+            observer: gain (n_states, n_outputs) that pulls the state to `measured`.
+            measured: recorded outputs, for the observer.
+            n_record: samples of the whole record, for drift; `n_samples` when None.
+        """
+        # The compiler behind the kernel takes a second to load, and only responses need it.
+        from lab import kernel
+
+        plant = self.plant
+        if not inputs.shape[0]:
+            inputs = np.zeros((len(plant.inputs), n_samples))
+        u = self._driven(inputs[:, :n_samples])
+        n_states = self.matrices[0].shape[0]
+        state = np.zeros(n_states)
+        if initial is not None:
+            state[: initial.size] = initial
+        matrices, products = self.matrices, n_samples * self.matrices[1].shape[0] * n_states**2
+        paired = self.transition.pairs if products > WORTH_PAIRING else None
+        if paired is not None:
+            matrices, state = self.transition.paired, paired.inverse @ state
+            observer = paired.inverse @ observer if observer.size else observer
+        y = np.zeros((0, 0))
+        if measured is not None and observer.size:
+            y = np.ascontiguousarray(
+                structural(plant.output_paths, plant.order, measured[:, :n_samples], self.dt).T
+            )
+        with np.errstate(over="ignore", invalid="ignore"):
+            out = kernel.respond(  # type: ignore[call-arg]
+                matrices[0],
+                NO_PAIRS if paired is None else paired.turns,
+                *matrices[1:],
+                self.laws,
+                self.parameters,
+                u,
+                state,
+                n_record or n_samples,
+                observer,
+                y,
+            )
+        return recorded(plant.output_paths, plant.order, np.ascontiguousarray(out.T), self.dt)
+
+    def _driven(self, inputs: Array) -> Array:
+        """Inputs of the kernel, (n_samples, n_inputs): forces of the actuators, then of tones."""
+        columns = pushed(self.plant.input_paths, inputs, self.dt)
+        for tone in self.plant.tones:
+            # A force that nobody measured is held over each sample like every other.
+            phase = 2 * np.pi * tone.frequency_hz * np.arange(inputs.shape[1]) * self.dt
+            columns.append(tone.sine * np.sin(phase) + tone.cosine * np.cos(phase))
+        return np.array(columns).reshape(-1, inputs.shape[1]).T.copy()
+
+
+def ready(plant: Plant, dt: float, *, substeps: int = 6) -> Responder:
+    """The plant ready to respond at sample time `dt` [s]; `substeps` per sample where there are laws."""
+    sub = substeps if plant.laws else 1
+    parameters = np.zeros((len(plant.laws), 3))
+    for i, law in enumerate(plant.laws):
+        parameters[i, : len(law.parameters)] = law.parameters
+    kinds = np.array([law.kind for law in plant.laws], dtype=np.int64)
+    return Responder(plant, dt, sub, transition_of(plant, dt, sub), kinds, parameters)
