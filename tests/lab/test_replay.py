@@ -13,9 +13,10 @@ from lab.simulate import simulate
 ACCURACY = 1e-3
 
 
-@pytest.fixture(scope="module", params=["cubic_stiffness", "freeplay"])
+@pytest.fixture(scope="module", params=["cubic_stiffness", "freeplay", "stiffness_change"])
 def case(request):
-    size = {"cubic_stiffness": {"k3": 2.0}, "freeplay": {"half_gap": 0.05}}[request.param]
+    sizes = {"cubic_stiffness": {"k3": 2.0}, "freeplay": {"half_gap": 0.05}}
+    size = sizes.get(request.param, {"relative_change": 0.3})
     rig = Rig.load("models/chain3_coupled.xml").connected(inputs=["force1"], outputs=["acc1.x", "acc3.x"])
     rig = EFFECTS[request.param]("spring2_3", **size).apply(rig)
     recording = simulate(rig, Random(rms=1.0), sample_rate=5.0, duration=60.0, seed=4)
