@@ -107,8 +107,7 @@ def shared(function: Callable[[Item], Outcome], items: Sequence[Item]) -> Iterat
                 sent[last] = _sent(_piece, task, last, items[last])
             if number not in sent:
                 waiting.popleft()
-                yield _alone(function, item)
-            elif _is_first(task, number):
+            if number not in sent or _is_first(task, number):
                 yield _alone(function, item)
             else:
                 yield _received(sent[number], partial(function, item))

@@ -124,7 +124,7 @@ def _yielding(p, z, dx):  # type: ignore[no-untyped-def]
 
 @njit(cache=True, nogil=True, fastmath=REORDERED)
 def _in_fours(A):  # type: ignore[no-untyped-def]
-    """A matrix with rows and columns of zeros that make the number of each a multiple of four."""
+    """A matrix with rows and columns of zeros that make the number of each a multiple of four: so many at once."""
     n, m = A.shape
     padded = np.zeros((n + (-n) % 4, m + (-m) % 4))
     padded[:n, :m] = A
@@ -159,7 +159,7 @@ def _turned(turns, pushes, acting, out):  # type: ignore[no-untyped-def]
 
 @njit(cache=True, nogil=True, fastmath=REORDERED)
 def respond(F, turns, G, P, Q, X, V, S, T, R, at, C, D, E, laws, params, u, x0, n_record, L, y):  # type: ignore[no-untyped-def]
-    """Outputs, shape (n_samples, n_outputs), of one record; NaN from where the motion diverges.
+    """Outputs, shape (n_samples, n_outputs), of one record; NaN from the sample in which the motion diverges.
 
     Args:
         F: state over one substep, (n_states, n_states), or no rows where states move in pairs.
@@ -187,8 +187,8 @@ def respond(F, turns, G, P, Q, X, V, S, T, R, at, C, D, E, laws, params, u, x0, 
     acting[:n_states] = x0
     x, g = acting[:n_states], acting[n_states + n_inputs : n_acting]
     readings, last_read = _in_fours(np.concatenate((C, D, E), axis=1)), np.max(at)
-    pushes = np.zeros((substeps, n_inputs + n_laws, n_states))
-    for step in range(substeps):
+    pushes = np.zeros((substeps if paired else 0, n_inputs + n_laws, n_states))
+    for step in range(pushes.shape[0]):
         pushes[step, :n_inputs], pushes[step, n_inputs:] = G[step].T, P.T
     if paired:
         columns, unit = np.zeros((n_states, n_states)), np.zeros(acting.size)

@@ -21,7 +21,7 @@ def process_pool(n: int, begin: Callable[[], None] | None = None) -> ProcessPool
 
 
 def _settle(begin: Callable[[], None] | None, threshold: tuple[int, int, int]) -> None:
-    """Makes a worker leave stopping to its parent, leave with it, and look for garbage as often."""
+    """Makes a worker leave stopping to its parent, leave with it, and look for garbage as often as it does."""
     gc.set_threshold(*threshold)
     if begin is not None:
         begin()

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from contextlib import suppress
 from dataclasses import dataclass
 from functools import partial
 
@@ -14,7 +15,7 @@ from lab.excitation import Excitation
 from lab.loads import BLOCK, Blocks, Load, Sampling
 from lab.rig import Rig
 from lab.simulate import simulate
-from lab.stepping import Plan, first_guess, highest_frequency
+from lab.stepping import first_guess, highest_frequency
 
 MOST_SUBSTEPS = 256
 """Where doubling the substeps ends, converged or not."""
@@ -62,8 +63,8 @@ def replay(
     Args:
         rig: with the channels of the recording connected.
         recording: whose inputs drive it.
-        accuracy: relative error that is small enough, in the root mean square where the rig is not linear; under dry
-            friction, what can be reached is taken.
+        accuracy: relative error that is small enough, in the root mean square where the rig is not linear or outputs are
+            expected; under dry friction, what can be reached is taken.
         starts: displacement and velocity at the start of each record; all begin at rest when None.
         expected: outputs by other means, (n_outputs, n_samples) each: what agrees with them needs no finer substeps.
     """
@@ -77,19 +78,22 @@ def replay(
         rate, duration = recording.sample_rate, record.n_samples / recording.sample_rate
         respond = partial(simulate, rig, Replay(inputs, start), sample_rate=rate, duration=duration)
         if rig.linear:
-            guess = first_guess(rig, 1 / rate, accuracy, duration)
-            outputs.append(_refined(rig, respond, guess, accuracy, other))
+            outputs.append(_refined(rig, respond, 1 / rate, duration, accuracy, other))
         else:
             outputs.append(_doubled(rig, respond, 1 / rate, accuracy, other))
     return outputs
 
 
-def _refined(rig: Rig, respond: Respond, guess: Plan, accuracy: float, expected: Array | None) -> Array:
+def _refined(
+    rig: Rig, respond: Respond, dt: float, duration: float, accuracy: float, expected: Array | None
+) -> Array:
     """Outputs that are what was expected, or as accurate as asked for, or nearly so."""
-    if expected is not None and not guess.cancelled:
-        coarse = _outputs(respond(substeps=guess.substeps))
-        if _agree(coarse, expected, accuracy):
-            return coarse
+    guess = None if expected is None else first_guess(rig, dt, accuracy, duration)
+    if expected is not None and guess is not None and not guess.cancelled:
+        with suppress(LabError):
+            coarse = _outputs(respond(substeps=guess.substeps))
+            if _agree(coarse, expected, accuracy):
+                return coarse
     for allowed in (accuracy, 10 * accuracy, 100 * accuracy, 0.9):
         try:
             return _outputs(respond(accuracy=allowed))
@@ -118,8 +122,10 @@ def _doubled(rig: Rig, respond: Respond, dt: float, accuracy: float, expected: A
 
 def _agree(outputs: Array, others: Array, accuracy: float) -> bool:
     """Whether outputs differ by no more than a share of their root mean square."""
-    size = np.sqrt(np.mean(outputs**2, axis=1))
-    return bool(np.all(np.sqrt(np.mean((outputs - others) ** 2, axis=1)) <= accuracy * size))
+    # What others expect may have diverged.
+    with np.errstate(over="ignore", invalid="ignore"):
+        size = np.sqrt(np.mean(outputs**2, axis=1))
+        return bool(np.all(np.sqrt(np.mean((outputs - others) ** 2, axis=1)) <= accuracy * size))
 
 
 def _outputs(recording: Recording) -> Array:

@@ -1,4 +1,4 @@
-"""Responder: a plant made ready for one sample time; its responses take milliseconds."""
+"""Responder: a plant made ready for one sample time."""
 
 from __future__ import annotations
 

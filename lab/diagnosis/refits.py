@@ -12,7 +12,7 @@ from identification.progress import Work
 from identification.recording import Array
 from lab.diagnosis.calibrate import Calibration
 from lab.diagnosis.candidate import Candidate, last_of
-from lab.diagnosis.fit import Fit, fit, resumed, theta_slopes
+from lab.diagnosis.fit import Fit, fit, objective, resumed, theta_slopes
 from lab.diagnosis.misfit import Hypothesis, Misfit
 from lab.diagnosis.observer import kalman_gain
 from lab.diagnosis.screening import Screened, coarsely
@@ -45,13 +45,14 @@ def refitted(
         (row.theta, (*present.causes, row.hypothesis), None) for row in picked
     ]
     *leading_, rough, whole = work.parts(*[3.0 for _ in shares], 2.0, 3.0)
-    # Causes are small at first: those who start together share the slopes of the model without them.
     # What leads far ahead does so on half the samples, too; what is close is kept.
     coarse = coarsely(misfit, present.theta, present.causes)
-    seen = [halved(coarse)] * (len(shares) - 1) + [coarse]
-    near = [_Near.at(seen[0], theta, present, shares[0] if shares else 0.0) for theta in _starts_of(picked)]
-    for share, some, part in zip(shares, seen, leading_, strict=False):
-        led = part.each(shared(partial(_led, some, share, near), [row[:2] for row in running]), len(running))
+    seen = [_halved(coarse) for _ in shares[:-1]] + [coarse for _ in shares[-1:]]
+    # Causes are small at first: those who start together share the slopes of the model without them.
+    begun, share = (seen[0], shares[0]) if shares else (misfit, 0.0)
+    near = [_Near.at(begun, theta, present, share) for theta in _starts_of(picked)]
+    for share, view, part in zip(shares, seen, leading_, strict=True):
+        led = part.each(shared(partial(_led, view, share, near), [row[:2] for row in running]), len(running))
         running = [(f.theta, f.causes, f) for f in leading([f for f in led if f is not None])]
         near = []
     roughly = shared(partial(_roughly, misfit, present.observer, near), [row[:2] for row in running])
@@ -63,7 +64,7 @@ def refitted(
     return [(f, guided) for f, guided in found if f is not None]
 
 
-def halved(misfit: Misfit) -> Misfit:
+def _halved(misfit: Misfit) -> Misfit:
     """The misfit on the first half of what fits may see of every record."""
     return replace(misfit, n_train=tuple(-(-n // 2) for n in misfit.n_train))
 
@@ -172,7 +173,11 @@ def steadied(calibration: Calibration, candidates: list[Candidate], without: flo
     first = min(led, key=lambda c: c.guided.objective if c.guided else np.inf)
     misfit, guided = calibration.misfit, first.guided
     assert guided is not None
-    if first.fit.objective <= guided.objective or not misfit.plant(guided.theta, guided.causes).laws:
+    if not misfit.plant(guided.theta, guided.causes).laws:
+        return candidates
+    # It was led with few substeps, and is held against a fit with as many as fits take.
+    left = misfit.residual(guided.theta, guided.causes, observer=guided.observer)
+    if first.fit.objective <= objective(left, guided.theta, guided.precision, misfit.colour):
         return candidates
     theta, causes, share = guided.theta, guided.causes, calibration.share
     steps = np.geomspace(share / 10, NEGLIGIBLE, max(int(2 * np.log10(share / 10 / NEGLIGIBLE)), 0) + 1)

@@ -57,7 +57,7 @@ class Screening:
 
 
 def coarsely(misfit: Misfit, theta: Array, present: Sequence[Hypothesis]) -> Misfit:
-    """The misfit with as few substeps as rank causes, where no law is present that they must not be mistaken for."""
+    """The misfit with fewer substeps, enough to rank causes by; as it is where a law is present already."""
     return misfit if misfit.plant(theta, present).laws else replace(misfit, substeps=SCREEN_SUBSTEPS)
 
 

@@ -1,8 +1,12 @@
 """Gain: rigs are held against their own twins, where they have one."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
+from identification.recording import Record
+from lab.diagnosis import gain
 from lab.diagnosis.gain import _by_the_twin
 from lab.effects import EFFECTS
 from lab.excitation import Random
@@ -30,6 +34,31 @@ def test_a_rig_and_its_twin_move_alike(rig, recording, start):
     (found,) = _by_the_twin(rig, recording, [start], 96)
     # The twin errs with the square of its substep: a thousandth of it at 96 of them.
     assert np.sqrt(np.mean((found - simulated) ** 2)) < 10 * ACCURACY * np.sqrt(np.mean(simulated**2))
+
+
+def test_what_is_replayed_is_held_against_the_twin(rig, recording, monkeypatch):
+    seen = []
+
+    def watched(*arguments, expected, **options):
+        seen.extend(expected)
+        return replay(*arguments, expected=expected, **options)
+
+    monkeypatch.setattr(gain, "replay", watched)
+    forced, decay = recording.records[0], recording.records[0].outputs[:, :]
+    gap = decay.copy()
+    gap[0, 10:20] = np.nan
+    both = replace(
+        recording,
+        records=(
+            replace(forced, outputs=gap),
+            Record("free_decay", np.zeros((0, decay.shape[1])), decay),
+        ),
+    )
+    start = np.array([0.1, 0.0, -0.2, 0.0, 0.3, 0.1])
+    found = gain._simulated(both, rig.dofs, 1e-2, 24, (rig, (None, start)))
+    for simulated, expected in zip(found, seen, strict=True):
+        assert np.sqrt(np.mean((simulated - expected) ** 2)) <= 1e-2 * np.sqrt(np.mean(expected**2))
+    assert np.max(np.abs(found[1][:, 0])) > 0.1
 
 
 def test_a_rig_that_no_twin_can_stand_for_has_none(recording):

@@ -5,8 +5,39 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from lab.diagnosis.misfit import Parameters
-from lab.diagnosis.screening import Screened, Screening
+from identification.recording import Record, Recording
+from lab.diagnosis.calibrate import parameters_of
+from lab.diagnosis.misfit import Misfit, Parameters
+from lab.diagnosis.refits import _halved
+from lab.diagnosis.screening import Screened, Screening, coarsely
+from lab.forces import CUBIC
+from lab.rig import Rig
+from lab.twin import twin
+
+XML = "models/chain3_coupled.xml"
+
+
+@pytest.fixture
+def misfit():
+    rig = Rig.load(XML).connected(inputs=["force1"], outputs=["acc1.x"])
+    u, y = np.zeros((1, 21)), np.zeros((1, 21))
+    records = (Record("random", u, y), Record("free_decay", u[:, :10], y[:, :10]))
+    known = Recording(records, rig.inputs, rig.outputs, 5.0)
+    model = twin(rig)
+    return Misfit.of(known, model, parameters_of(model), share=1.0)
+
+
+def test_half_of_every_record_is_seen(misfit):
+    assert misfit.n_train == (21, 10)
+    assert _halved(misfit).n_train == (11, 5)
+
+
+def test_substeps_are_few_where_no_law_is_present(misfit):
+    theta = np.zeros(misfit.parameters.n)
+    assert coarsely(misfit, theta, ()).substeps < misfit.substeps
+    plant = misfit.twin.plant.with_law(CUBIC, np.eye(3)[0], 1.0, 0.0)
+    bent = replace(misfit, twin=replace(misfit.twin, plant=plant))
+    assert coarsely(bent, theta, ()).substeps == misfit.substeps
 
 
 def row(score):
