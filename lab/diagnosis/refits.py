@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import partial
 
 import numpy as np
@@ -45,14 +45,13 @@ def refitted(
         (row.theta, (*present.causes, row.hypothesis), None) for row in picked
     ]
     *leading_, rough, whole = work.parts(*[3.0 for _ in shares], 2.0, 3.0)
-    # What leads far ahead does so on half the samples, too; what is close is kept.
-    coarse = coarsely(misfit, present.theta, present.causes)
-    seen = [_halved(coarse) for _ in shares[:-1]] + [coarse for _ in shares[-1:]]
     # Causes are small at first: those who start together share the slopes of the model without them.
-    begun, share = (seen[0], shares[0]) if shares else (misfit, 0.0)
-    near = [_Near.at(begun, theta, present, share) for theta in _starts_of(picked)]
-    for share, view, part in zip(shares, seen, leading_, strict=True):
-        led = part.each(shared(partial(_led, view, share, near), [row[:2] for row in running]), len(running))
+    near = [_Near.at(misfit, theta, present, shares[0] if shares else 0.0) for theta in _starts_of(picked)]
+    coarse = coarsely(misfit, present.theta, present.causes)
+    for share, part in zip(shares, leading_, strict=True):
+        led = part.each(
+            shared(partial(_led, coarse, share, near), [row[:2] for row in running]), len(running)
+        )
         running = [(f.theta, f.causes, f) for f in leading([f for f in led if f is not None])]
         near = []
     roughly = shared(partial(_roughly, misfit, present.observer, near), [row[:2] for row in running])
@@ -62,11 +61,6 @@ def refitted(
     wholly = shared(partial(_wholly, misfit, present.observer), [(f.theta, f.causes) for f in kept])
     found = [(f, plain[id(start)]) for f, start in zip(whole.each(wholly, len(kept)), kept, strict=True)]
     return [(f, guided) for f, guided in found if f is not None]
-
-
-def _halved(misfit: Misfit) -> Misfit:
-    """The misfit on the first half of what fits may see of every record."""
-    return replace(misfit, n_train=tuple(-(-n // 2) for n in misfit.n_train))
 
 
 @dataclass(frozen=True, eq=False)

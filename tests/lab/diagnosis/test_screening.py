@@ -8,7 +8,6 @@ import pytest
 from identification.recording import Record, Recording
 from lab.diagnosis.calibrate import parameters_of
 from lab.diagnosis.misfit import Misfit, Parameters
-from lab.diagnosis.refits import _halved
 from lab.diagnosis.screening import Screened, Screening, coarsely
 from lab.forces import CUBIC
 from lab.rig import Rig
@@ -25,11 +24,6 @@ def misfit():
     known = Recording(records, rig.inputs, rig.outputs, 5.0)
     model = twin(rig)
     return Misfit.of(known, model, parameters_of(model), share=1.0)
-
-
-def test_half_of_every_record_is_seen(misfit):
-    assert misfit.n_train == (21, 10)
-    assert _halved(misfit).n_train == (11, 5)
 
 
 def test_substeps_are_few_where_no_law_is_present(misfit):
