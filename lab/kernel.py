@@ -145,26 +145,43 @@ def _product(A, x, out):  # type: ignore[no-untyped-def]
 
 
 @njit(cache=True, nogil=True, fastmath=REORDERED)
-def _turned(turns, pushes, acting, out):  # type: ignore[no-untyped-def]
-    """Puts into out the states after a step, where each moves with its partner only, half of the states away."""
-    n, half = pushes.shape[1], pushes.shape[1] // 2
-    for j in range(half):
-        out[j] = turns[0, j] * acting[j] + turns[1, j] * acting[j + half]
-        out[j + half] = turns[0, j + half] * acting[j + half] + turns[1, j + half] * acting[j]
-    for i in range(pushes.shape[0]):
-        push = acting[n + i]
-        for j in range(n):
-            out[j] += pushes[i, j] * push
+def _over_a_sample(F, G, P, Q, X, V, at, C, D, E):  # type: ignore[no-untyped-def]
+    """What comes of a sample, from state, inputs and forces of the laws at its start, and from those at each substep's end.
+
+    Rows are extensions of the laws and then their rates at the end of each substep, without the force that ends there;
+    states at the end of the sample; and outputs that are read on the way.
+    """
+    (substeps, n_states, n_inputs), n_laws = G.shape, P.shape[1]
+    n_ends = 2 * n_laws * substeps
+    now = np.zeros((n_states, n_states + n_inputs + (substeps + 1) * n_laws))
+    n_late = at.size if np.any(at > 0) else 0
+    every = np.zeros((n_ends + n_states + n_late, now.shape[1]))
+    for j in range(n_states):
+        now[j, j] = 1.0
+    for step in range(substeps):
+        start = n_states + n_inputs + step * n_laws
+        for i in range(n_late):
+            if at[i] == step:
+                read = every[n_ends + n_states + i]
+                read[:] = C[i] @ now
+                read[n_states : n_states + n_inputs] += D[i]
+                read[start : start + n_laws] += E[i]
+        now = F @ now
+        now[:, n_states : n_states + n_inputs] += G[step]
+        now[:, start : start + n_laws] += P
+        at_end = every[2 * n_laws * step :]
+        at_end[:n_laws], at_end[n_laws : 2 * n_laws] = X @ now, V @ now
+        now[:, start + n_laws : start + 2 * n_laws] += Q
+    every[n_ends : n_ends + n_states] = now
+    return every
 
 
 @njit(cache=True, nogil=True, fastmath=REORDERED)
-def respond(F, turns, G, P, Q, X, V, S, T, R, at, C, D, E, laws, params, u, x0, n_record, L, y):  # type: ignore[no-untyped-def]
+def respond(F, G, P, Q, X, V, S, T, R, at, C, D, E, laws, params, u, x0, n_record, L, y):  # type: ignore[no-untyped-def]
     """Outputs, shape (n_samples, n_outputs), of one record; NaN from the sample in which the motion diverges.
 
     Args:
-        F: state over one substep, (n_states, n_states), or no rows where states move in pairs.
-        turns: state over one substep where states move in pairs, (2, n_states): share of its own, and of its
-            partner's half of the states away.
+        F: state over one substep, (n_states, n_states).
         G: inputs held over a sample, in each of its substeps, (substeps, n_states, n_inputs).
         P, Q: forces of the laws that fall from one to zero and rise from zero to one over a substep, (n_states, n_laws);
             for dry friction, which jumps, zero and the force that is one all along.
@@ -180,37 +197,20 @@ def respond(F, turns, G, P, Q, X, V, S, T, R, at, C, D, E, laws, params, u, x0, 
         y: measured outputs, (n_samples, n_outputs), used with an observer only; NaN where missing.
     """
     n, n_states, n_inputs, n_outputs, n_laws = u.shape[0], x0.size, u.shape[1], C.shape[0], laws.size
-    paired, substeps = F.shape[0] == 0, G.shape[0]
-    # What acts: state, inputs, and forces of the laws.
-    n_acting = n_states + n_inputs + n_laws
-    acting = np.zeros(n_acting + (-n_acting) % 4)
+    substeps, n_acting = G.shape[0], n_states + n_inputs + n_laws
+    n_ends, any_late = 2 * n_laws * substeps, np.any(at > 0)
+    every = _over_a_sample(F, G, P, Q, X, V, at, C, D, E)
+    # What acts at the start of a sample, and what comes of it.
+    acting, moves = np.zeros(n_acting + (-n_acting) % 4), _in_fours(every[:, :n_acting])
+    readings = _in_fours(np.concatenate((C, D, E), axis=1))
+    ends, reading = np.zeros(moves.shape[0]), np.zeros(readings.shape[0])
+    n_after = every.shape[0] - n_ends
+    arrived = ends[n_ends : n_ends + n_after]
     acting[:n_states] = x0
     x, g = acting[:n_states], acting[n_states + n_inputs : n_acting]
-    readings, last_read = _in_fours(np.concatenate((C, D, E), axis=1)), np.max(at)
-    pushes = np.zeros((substeps if paired else 0, n_inputs + n_laws, n_states))
-    for step in range(pushes.shape[0]):
-        pushes[step, :n_inputs], pushes[step, n_inputs:] = G[step].T, P.T
-    if paired:
-        columns, unit = np.zeros((n_states, n_states)), np.zeros(acting.size)
-        for j in range(n_states):
-            unit[:] = 0.0
-            unit[j] = 1.0
-            _turned(turns, pushes[0], unit, columns[j])
-        F = np.ascontiguousarray(columns.T)
-    # What comes of it at the end of a substep, without the forces that rise: states unless they move in pairs, then
-    # extensions of the laws and their rates.
-    first = 0 if paired else n_states
-    rows = first + 2 * n_laws
-    moves = np.zeros((substeps, rows + (-rows) % 4, acting.size))
-    for step in range(substeps):
-        every = np.concatenate((F, G[step], P), axis=1)
-        moves[step, :first, :n_acting] = every[:first]
-        moves[step, first : first + n_laws, :n_acting] = X @ every
-        moves[step, first + n_laws : rows, :n_acting] = V @ every
-    ends, reading = np.zeros(moves.shape[1]), np.zeros(readings.shape[0])
-    free = np.zeros(n_states) if paired else ends[:n_states]
-    xf, vf = ends[first : first + n_laws], ends[first + n_laws : rows]
-    stuck_on = np.ascontiguousarray(Q.T)
+    # The forces that end each substep, and what comes of them: extensions within the sample, states and readings after it.
+    later, pushes = np.ascontiguousarray(every[:n_ends, n_acting:]), _in_fours(every[n_ends:, n_acting:])
+    since, pushed = np.zeros(pushes.shape[1]), np.zeros(pushes.shape[0])
     out, z = np.empty((n, n_outputs)), np.zeros(n_laws)
     # Extensions and their rates at the start of a substep; and per force of each law at its end.
     xs, vs = np.zeros(n_laws), np.zeros(n_laws)
@@ -221,6 +221,7 @@ def respond(F, turns, G, P, Q, X, V, S, T, R, at, C, D, E, laws, params, u, x0, 
     for e in range(n_laws):
         stuck[e] = dry[e] and not np.any(V[e] * x0)
     any_dry = np.any(dry)
+    per_sample, per_substep = 1 / n_record, 1 / n_record / substeps
     for k in range(n):
         s = k / n_record
         for i in range(n_inputs):
@@ -256,16 +257,17 @@ def respond(F, turns, G, P, Q, X, V, S, T, R, at, C, D, E, laws, params, u, x0, 
                     if error == error:
                         for j in range(n_states):
                             x[j] += pulls[i, j] * error
+        _product(moves, acting, ends)
         for step in range(substeps):
-            s = (k + (step + 1) / substeps) / n_record
-            if step > 0 and step <= last_read:
-                _product(readings, acting, reading)
-                for i in range(n_outputs):
-                    if at[i] == step:
-                        out[k, i] = reading[i]
-            if paired:
-                _turned(turns, pushes[step], acting, free)
-            _product(moves[step], acting, ends)
+            s = k * per_sample + (step + 1) * per_substep
+            first = 2 * n_laws * step
+            xf, vf = ends[first : first + n_laws], ends[first + n_laws : first + 2 * n_laws]
+            for e in range(n_laws):
+                x_end, v_end = xf[e], vf[e]
+                for i in range(step * n_laws):
+                    x_end += later[first + e, i] * since[i]
+                    v_end += later[first + n_laws + e, i] * since[i]
+                xf[e], vf[e] = x_end, v_end
             # With several laws, each is solved in turn given the others, until none moves.
             for _ in range(1 if n_laws <= 1 else 12):
                 moved = 0.0
@@ -282,15 +284,18 @@ def respond(F, turns, G, P, Q, X, V, S, T, R, at, C, D, E, laws, params, u, x0, 
                     elif laws[e] == COULOMB:
                         g[e] = _rounded(params[e], v_end, a_v)
                     elif laws[e] == BOUC_WEN:
-                        trial = g[e]
-                        for _ in range(8):
-                            dx = x_end + a_x * trial - xs[e]
-                            mean = 0.5 * (z[e] + trial)
-                            trial = (
-                                z[e]
-                                + params[e, 0] * dx
-                                - 0.5 / params[e, 1] * (abs(dx) * mean + dx * abs(mean))
-                            )
+                        # Newton: the force bends over a substep, and following it alone creeps where the spring is stiff.
+                        trial, bend = g[e], 0.5 / params[e, 1]
+                        for _ in range(12):
+                            dx, mean = x_end + a_x * trial - xs[e], 0.5 * (z[e] + trial)
+                            # |dx| z + dx |z| is nothing where their signs differ.
+                            alike = 2.0 if (dx > 0) == (mean > 0) else 0.0
+                            level, way = alike * abs(mean), alike * abs(dx)
+                            error = z[e] + params[e, 0] * dx - bend * dx * level - trial
+                            change = error / (1 - a_x * (params[e, 0] - bend * level) + 0.5 * bend * way)
+                            trial += change
+                            if abs(change) <= 1e-13 * abs(trial):
+                                break
                         g[e] = trial
                     else:
                         trial = g[e]
@@ -307,16 +312,21 @@ def respond(F, turns, G, P, Q, X, V, S, T, R, at, C, D, E, laws, params, u, x0, 
             for e in range(n_laws):
                 if laws[e] == BOUC_WEN:
                     z[e] = g[e]
-            for e in range(n_laws):
-                for j in range(n_states):
-                    free[j] += stuck_on[e, j] * g[e]
-            for e in range(n_laws):
+                since[step * n_laws + e] = g[e]
                 xs[e], vs[e] = xf[e], vf[e]
                 for other in range(n_laws):
                     xs[e] += per_x[e, other] * g[other]
                     vs[e] += per_v[e, other] * g[other]
-            for j in range(n_states):
-                x[j] = free[j]
+        if n_laws:
+            _product(pushes, since, pushed)
+            for j in range(n_after):
+                arrived[j] += pushed[j]
+        for j in range(n_states):
+            x[j] = arrived[j]
+        if any_late:
+            for i in range(n_outputs):
+                if at[i] > 0:
+                    out[k, i] = arrived[n_states + i]
         gone = 0
         for j in range(n_states):
             gone += not abs(x[j]) < 1e100

@@ -9,11 +9,9 @@ import numpy as np
 from identification.recording import Array
 from lab.paths import pushed, recorded, structural
 from lab.plant import Plant
-from lab.transition import NO_PAIRS, Transition, transition_of
+from lab.transition import transition_of
 
 NO_OBSERVER = np.zeros((0, 0))
-WORTH_PAIRING = 4e6
-"""Products per response, of the transition with the state, beyond which finding pairs of states costs less than it saves."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -26,14 +24,9 @@ class Responder:
     plant: Plant
     dt: float
     substeps: int
-    transition: Transition
+    matrices: tuple[Array, ...]
     laws: np.ndarray
     parameters: Array
-
-    @property
-    def matrices(self) -> tuple[Array, ...]:
-        """Matrices of the kernel."""
-        return self.transition.matrices
 
     def outputs(
         self,
@@ -62,15 +55,9 @@ class Responder:
         if not inputs.shape[0]:
             inputs = np.zeros((len(plant.inputs), n_samples))
         u = self._driven(inputs[:, :n_samples])
-        n_states = self.matrices[0].shape[0]
-        state = np.zeros(n_states)
+        state = np.zeros(self.matrices[0].shape[0])
         if initial is not None:
             state[: initial.size] = initial
-        matrices, products = self.matrices, n_samples * self.matrices[1].shape[0] * n_states**2
-        paired = self.transition.pairs if products > WORTH_PAIRING else None
-        if paired is not None:
-            matrices, state = self.transition.paired, paired.inverse @ state
-            observer = paired.inverse @ observer if observer.size else observer
         y = np.zeros((0, 0))
         if measured is not None and observer.size:
             y = np.ascontiguousarray(
@@ -78,16 +65,7 @@ class Responder:
             )
         with np.errstate(over="ignore", invalid="ignore"):
             out = kernel.respond(  # type: ignore[call-arg]
-                matrices[0],
-                NO_PAIRS if paired is None else paired.turns,
-                *matrices[1:],
-                self.laws,
-                self.parameters,
-                u,
-                state,
-                n_record or n_samples,
-                observer,
-                y,
+                *self.matrices, self.laws, self.parameters, u, state, n_record or n_samples, observer, y
             )
         return recorded(plant.output_paths, plant.order, np.ascontiguousarray(out.T), self.dt)
 

@@ -2,46 +2,25 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-from functools import cached_property, lru_cache
+from functools import lru_cache
 
 import numpy as np
 import scipy.linalg
 
 from identification.recording import Array
 from lab.forces import COULOMB
-from lab.pairs import Pairs, pairs_of
 from lab.plant import Law, Plant
 
-NO_PAIRS = np.zeros((0, 0))
 Changes = dict[int, tuple[int, float]]
 """For each input column that acts after the force of a late actuator changes within a sample: the column that acts before,
 and when it changes [s]."""
 
 
-@dataclass(frozen=True, eq=False)
-class Transition:
-    """Matrices of the kernel, F, G, P, Q, X, V, S, T, R, at, C, D and E, and pairs of the states they act on."""
+def transition_of(plant: Plant, dt: float, sub: int) -> tuple[Array, ...]:
+    """Matrices of the kernel, F, G, P, Q, X, V, S, T, R, at, C, D and E, for a sample of `dt` [s] in `sub` substeps.
 
-    matrices: tuple[Array, ...]
-
-    @cached_property
-    def pairs(self) -> Pairs | None:
-        """Pairs of states; None where they are not told apart."""
-        return pairs_of(self.matrices[0])
-
-    @cached_property
-    def paired(self) -> tuple[Array, ...]:
-        """The matrices for states in pairs; no rows stand for the transition."""
-        _, G, P, Q, X, V, S, T, R, at, C, D, E = self.matrices
-        assert self.pairs is not None
-        shapes, inverse = self.pairs.shapes, self.pairs.inverse
-        matrices = (NO_PAIRS, inverse @ G, inverse @ P, inverse @ Q, X @ shapes, V @ shapes, S @ shapes)
-        return (*matrices, T, R, at, C @ shapes, D, E)
-
-
-def transition_of(plant: Plant, dt: float, sub: int) -> Transition:
-    """The transition of a plant over a sample of `dt` [s] in `sub` substeps, made once for laws of every size."""
+    They are made once for laws of every size.
+    """
     return _made(_Asked(plant, dt, sub))
 
 
@@ -73,7 +52,7 @@ def _dry(law: Law) -> bool:
 
 
 @lru_cache(maxsize=16)
-def _made(asked: _Asked) -> Transition:
+def _made(asked: _Asked) -> tuple[Array, ...]:
     """The linear part in states q, q̇, then one value per lagging input and per lagging output."""
     plant, dt, sub = asked.plant, asked.dt, asked.sub
     n, n_in, n_out = plant.n_dofs, len(plant.inputs), len(plant.outputs)
@@ -121,7 +100,7 @@ def _made(asked: _Asked) -> Transition:
     X[:, :n], V[:, n : 2 * n] = rows, rows
     S, T, R = V @ A, V @ _acting(B, 0.0, changes), V @ W
     at, C, D, E = _late_readings(plant, dt, sub, A, B, W, C, D, E, changes)
-    return Transition(tuple(np.ascontiguousarray(m) for m in (F, G, P, Q, X, V, S, T, R, at, C, D, E)))
+    return tuple(np.ascontiguousarray(m) for m in (F, G, P, Q, X, V, S, T, R, at, C, D, E))
 
 
 def _late_readings(

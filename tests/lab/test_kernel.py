@@ -8,7 +8,7 @@ import scipy.linalg
 import scipy.signal
 
 from lab import forces, kernel
-from lab.responder import NO_OBSERVER, ready
+from lab.responder import ready
 from lab.twin import twin
 from tests.lab.effects.cases import CASES
 from tests.lab.effects.reference import DT, EYE, SPRING, local, nominal, system
@@ -43,10 +43,8 @@ def error(found, truth):
     return np.max(np.max(np.abs(found - truth), axis=1) / np.max(np.abs(truth), axis=1))
 
 
-@pytest.mark.parametrize("worth", [0.0, np.inf])
 @pytest.mark.parametrize("names", [*((name,) for name in LAWS), ("cubic", "dry friction", "Bouc-Wen")])
-def test_compiled_is_plain(names, worth, monkeypatch):
-    monkeypatch.setattr("lab.responder.WORTH_PAIRING", worth)
+def test_compiled_is_plain(names, monkeypatch):
     responder, u = ready(with_laws(*names), DT, substeps=4), pushes(25)
     rng = np.random.default_rng(1)
     pulled = {"observer": 1e-3 * rng.standard_normal((6, 5)), "measured": rng.standard_normal((5, 25))}
@@ -59,7 +57,7 @@ def test_compiled_is_plain(names, worth, monkeypatch):
         "_yielding",
         "_in_fours",
         "_product",
-        "_turned",
+        "_over_a_sample",
         "respond",
     ):
         monkeypatch.setattr(kernel, function, getattr(kernel, function).py_func)
@@ -80,21 +78,6 @@ def test_a_memory_pulled_along_yields_as_its_equation_says(z, dx):
     for yielding in (kernel._yielding, kernel._yielding.py_func):
         # Euler's steps err by half a step of the exponential: 0.3 / 0.04 / 2 / 100 000.
         assert yielding(p, z * stiffness * reach, dx) == pytest.approx(force, abs=1e-4 * stiffness * reach)
-
-
-@pytest.mark.parametrize("observed", [False, True])
-@pytest.mark.parametrize("names", [(), *((name,) for name in LAWS), ("cubic", "dry friction", "Bouc-Wen")])
-def test_states_in_pairs_are_the_states(names, observed, monkeypatch):
-    u, rng = pushes(300), np.random.default_rng(1)
-    start, y = 0.1 * rng.standard_normal(6), rng.standard_normal((5, 300))
-    gain = 1e-3 * rng.standard_normal((6, 5)) if observed else NO_OBSERVER
-    found = []
-    for worth in (np.inf, 0.0):
-        monkeypatch.setattr("lab.responder.WORTH_PAIRING", worth)
-        responder = ready(with_laws(*names), DT, substeps=4)
-        found.append(responder.outputs(u, 300, initial=start, observer=gain, measured=y))
-    # Shapes with a condition below a hundred here cost two digits, 1200 substeps another one or two.
-    assert error(*found) < 1e-11
 
 
 def test_a_memory_that_never_yields_is_a_spring_where_measurements_pull_the_state():
