@@ -9,11 +9,10 @@ import numpy as np
 from identification.recording import Recording
 from lab.diagnosis.conclude import accuracy_below, extended_rig, floor_of
 from lab.diagnosis.fit import resumed
-from lab.diagnosis.gain import held_out_error, predicted
-from lab.diagnosis.starts import start_of, starts_of
+from lab.diagnosis.gain import held_out_error, predicted, simulated
+from lab.diagnosis.starts import motions_of, starts_of
 from lab.diagnosis.state import State
 from lab.errors import LabError
-from lab.replay import replay
 from lab.rig import Rig
 
 SHOWN = 30.0
@@ -35,10 +34,10 @@ def bent(state: State, recording: Recording, rig: Rig) -> State:
         return state
     misfit, found = state.misfit, state.fit
     model = extended_rig(state, rig)
-    begins = starts_of(misfit, found.theta)
+    accuracy = accuracy_below(floor_of(state))
     try:
-        starts = [None if begin is None else start_of(model, rig.dofs, begin) for begin in begins]
-        outputs = replay(model, recording, accuracy=accuracy_below(floor_of(state)), starts=starts)
+        motions = motions_of(model, rig.dofs, starts_of(misfit, found.theta))
+        outputs = simulated(recording, (model, motions), accuracy=accuracy, substeps=misfit.substeps)
     except LabError:
         return state
     tangent = predicted(replace(misfit, bend=()), found)

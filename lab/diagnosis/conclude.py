@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import itertools
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 
 import numpy as np
 
@@ -14,7 +14,7 @@ from lab.diagnosis.baseline import Baseline
 from lab.diagnosis.candidate import Candidate
 from lab.diagnosis.check import check
 from lab.diagnosis.evidence import undecided
-from lab.diagnosis.gain import errors_of, held_out, noise_floor, predictions_of
+from lab.diagnosis.gain import errors_of, held_out, noise_floor, predictions_of, simulated
 from lab.diagnosis.misfit import Misfit
 from lab.diagnosis.noise import noise_of
 from lab.diagnosis.outcome import (
@@ -28,7 +28,7 @@ from lab.diagnosis.outcome import (
     Finding,
     Quantity,
 )
-from lab.diagnosis.starts import best_starts, starts_of
+from lab.diagnosis.starts import best_starts, motions_of, starts_of
 from lab.diagnosis.state import State
 from lab.diagnosis.unlearnable import unlearnable
 from lab.diagnosis.whiteness import Whiteness
@@ -38,6 +38,7 @@ from lab.effects.edits import law_of, with_law, with_mass
 from lab.effects.effect import EVERYWHERE, Effect
 from lab.effects.mass_change import MassChange
 from lab.effects.stiffness_change import StiffnessChange
+from lab.hands import meanwhile
 from lab.rig import Rig
 
 
@@ -105,6 +106,7 @@ def conclude(
     left: Whiteness,
     known: Baseline | None,
     refused: Candidate | None,
+    as_given: Callable[[], list[Array]],
     work: Work = UNHEARD,
 ) -> Diagnosis:
     """What a diagnosis tells: findings with their sizes, alternatives, the extended model, and the gain on data kept aside.
@@ -118,6 +120,7 @@ def conclude(
         left: whether what remains is noise.
         known: what the baseline taught.
         refused: cause that the data ask for and that may not be named.
+        as_given: how to get the outputs of the nominal rig, as `nominal_ahead` gives it.
         work: told how much of this is done.
     """
     causes = effects_of(state)
@@ -125,14 +128,12 @@ def conclude(
     extended = extended_rig(state, rig)
     misfit = state.misfit
     floor = floor_of(state)
-    starts = [best_starts(misfit), starts_of(misfit, state.origin.theta), starts_of(misfit, state.fit.theta)]
+    driven = [
+        (model, motions_of(model, nominal.dofs, starts_of(misfit, found.theta)))
+        for model, found in ((calibrated, state.origin), (extended, state.fit))
+    ]
     predictions = predictions_of(
-        recording,
-        misfit,
-        (nominal, calibrated, extended),
-        starts,
-        accuracy=accuracy_below(floor),
-        work=work,
+        recording, misfit, as_given, driven, accuracy=accuracy_below(floor), work=work
     )
     shares = _shares(state, floor)
     findings = [
@@ -169,6 +170,18 @@ def conclude(
         tuple(warnings),
         noise=noise_of(state.fit.residual, recording),
         unlearnable=(*check(recording, nominal), *unlearnable(state.misfit, state.fit)),
+    )
+
+
+def nominal_ahead(state: State, recording: Recording, nominal: Rig) -> Callable[[], list[Array]]:
+    """How to get the outputs of the nominal rig, which a helper simulates while this process goes on."""
+    misfit = state.misfit
+    return meanwhile(
+        simulated,
+        recording,
+        (nominal, motions_of(nominal, nominal.dofs, best_starts(misfit))),
+        accuracy=accuracy_below(floor_of(state)),
+        substeps=misfit.substeps,
     )
 
 

@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import replace
 
 import numpy as np
 
 from identification.progress import Progress, Work
-from identification.recording import Recording
+from identification.recording import Array, Recording
 from lab.diagnosis.advance import (
     LAW_SUBSTEPS,
     finely,
@@ -23,7 +23,7 @@ from lab.diagnosis.bending import bent
 from lab.diagnosis.calibrate import calibrate, parameters_of
 from lab.diagnosis.candidate import Candidate
 from lab.diagnosis.changes import OWN_CHANGES
-from lab.diagnosis.conclude import calibrated_rig, conclude
+from lab.diagnosis.conclude import calibrated_rig, conclude, nominal_ahead
 from lab.diagnosis.evidence import minus_two_log_evidence
 from lab.diagnosis.fit import Fit
 from lab.diagnosis.gain import held_out_error
@@ -90,6 +90,7 @@ def diagnose(
     first: list[Candidate] = []
     refused: Candidate | None = None
     fine: State | None = None
+    as_given: Callable[[], list[Array]] | None = None
     left = _left(state)
     if not left.white:
         state = bent(state, recording, rig)
@@ -112,6 +113,8 @@ def diagnose(
             refused = candidates[0]
             break
         accepting.called("fitting what was found")
+        # Fits of one candidate are the work of this process alone.
+        as_given = as_given or nominal_ahead(replace(state, fit=candidates[0].fit), recording, nominal)
         further = with_cause(state, candidates[0], rig)
         fitted = finely(further)
         covered = known is not None and known.covers(fitted.misfit, fitted.fit)
@@ -129,7 +132,8 @@ def diagnose(
     state = fine if fine is not None and kept is state else finely(kept)
     left = _left(state)
     told = concluding.called("simulating what was found")
-    return conclude(state, recording, nominal, rig, first, left, known, refused, told)
+    as_given = as_given or nominal_ahead(state, recording, nominal)
+    return conclude(state, recording, nominal, rig, first, left, known, refused, as_given, told)
 
 
 def _left(state: State) -> Whiteness:

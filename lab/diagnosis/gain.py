@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from functools import partial
 
 import numpy as np
@@ -12,7 +12,6 @@ from identification.recording import Array, Recording
 from lab.diagnosis.fit import Fit
 from lab.diagnosis.misfit import Misfit
 from lab.diagnosis.outcome import Errors, Prediction
-from lab.diagnosis.starts import start_of
 from lab.errors import LabError
 from lab.hands import shared
 from lab.replay import replay
@@ -20,6 +19,8 @@ from lab.responder import ready
 from lab.rig import Rig
 from lab.twin import twin
 
+Driven = tuple[Rig, Sequence[tuple[Array, Array] | None]]
+"""A rig, and its displacement and velocity at the start of each record; None where it begins at rest."""
 PAST = 30
 """Samples of its own past from which a residual is predicted, to tell noise from what is not noise."""
 
@@ -27,8 +28,8 @@ PAST = 30
 def predictions_of(
     recording: Recording,
     misfit: Misfit,
-    rigs: Sequence[Rig],
-    starts: Sequence[Sequence[Array | None]],
+    nominal: Callable[[], list[Array]],
+    driven: Sequence[Driven],
     *,
     accuracy: float,
     work: Work = UNHEARD,
@@ -38,35 +39,32 @@ def predictions_of(
     Args:
         recording: what was measured.
         misfit: of the nominal rig.
-        rigs: nominal, calibrated, extended.
-        starts: for each of them, the motion at the start of each record, as the nominal rig has it.
+        nominal: how to get the outputs of the nominal rig.
+        driven: calibrated and extended rig.
         accuracy: of the simulation.
         work: told of every rig.
     """
     # Never in two threads: MuJoCo's callbacks belong to the whole process.
-    simulated = shared(
-        partial(_simulated, recording, rigs[0].dofs, accuracy, misfit.substeps),
-        list(zip(rigs, starts, strict=True)),
-    )
+    each = shared(partial(simulated, recording, accuracy=accuracy, substeps=misfit.substeps), driven)
+    calibrated, extended = work.each(each, len(driven))
     return tuple(
-        Prediction(measured, nominal, calibrated, extended, first)
-        for (_, measured), nominal, calibrated, extended, first in zip(
-            misfit.records, *work.each(simulated, len(rigs)), misfit.n_train, strict=True
+        Prediction(measured, as_given, before, after, first)
+        for (_, measured), as_given, before, after, first in zip(
+            misfit.records, nominal(), calibrated, extended, misfit.n_train, strict=True
         )
     )
 
 
-def _simulated(
-    recording: Recording,
-    dofs: tuple[str, ...],
-    accuracy: float,
-    substeps: int,
-    driven: tuple[Rig, Sequence[Array | None]],
-) -> list[Array]:
-    """Outputs of a rig that starts each record as told in terms of `dofs`, by MuJoCo."""
-    rig, begins = driven
-    motions = [None if start is None else start_of(rig, dofs, start) for start in begins]
-    # Where its own twin agrees, MuJoCo needs no finer steps to show that they are fine enough.
+def simulated(recording: Recording, driven: Driven, *, accuracy: float, substeps: int) -> list[Array]:
+    """Outputs of a rig under the inputs of each record, (n_outputs, n_samples) each, by MuJoCo.
+
+    Args:
+        recording: whose inputs drive it.
+        driven: rig and starts.
+        accuracy: of the simulation.
+        substeps: of its own twin: where that agrees, MuJoCo needs no finer steps to show that they are fine enough.
+    """
+    rig, motions = driven
     expected = _by_the_twin(rig, recording, motions, substeps)
     return replay(rig, recording, accuracy=accuracy, starts=motions, expected=expected)
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -90,8 +91,10 @@ def best_starts(misfit: Misfit) -> tuple[Array | None, ...]:
     return tuple(found)
 
 
-def start_of(rig: Rig, dofs: tuple[str, ...], start: Array) -> tuple[Array, Array]:
-    """Displacement and velocity of every degree of freedom of a rig from those of some.
+def motions_of(
+    rig: Rig, dofs: tuple[str, ...], starts: Sequence[Array | None]
+) -> list[tuple[Array, Array] | None]:
+    """Displacement and velocity of every degree of freedom of a rig at each start, from those of some; None for rest.
 
     What has been added to a structure moves along with what it is tied to.
     """
@@ -99,11 +102,14 @@ def start_of(rig: Rig, dofs: tuple[str, ...], start: Array) -> tuple[Array, Arra
     added = [i for i in range(len(rig.dofs)) if i not in known]
     K = rig.second_order().stiffness
     carried = -np.linalg.lstsq(K[np.ix_(added, added)], K[np.ix_(added, known)], rcond=None)[0]
-    motion = np.zeros((2, len(rig.dofs)))
-    for row, part in zip(motion, np.split(start, 2), strict=True):
-        row[known] = part
-        row[added] = carried @ part
-    return motion[0], motion[1]
+    found: list[tuple[Array, Array] | None] = []
+    for start in starts:
+        motion = np.zeros((2, len(rig.dofs)))
+        for row, part in zip(motion, () if start is None else np.split(start, 2), strict=False):
+            row[known] = part
+            row[added] = carried @ part
+        found.append(None if start is None else (motion[0], motion[1]))
+    return found
 
 
 def _swings(plant: Plant, dt: float, n_samples: int) -> Array:
