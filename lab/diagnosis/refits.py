@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import partial
 
 import numpy as np
@@ -15,7 +15,7 @@ from lab.diagnosis.candidate import Candidate, last_of
 from lab.diagnosis.fit import Fit, fit, objective, resumed, theta_slopes
 from lab.diagnosis.misfit import Hypothesis, Misfit
 from lab.diagnosis.observer import kalman_gain
-from lab.diagnosis.screening import Screened, coarsely
+from lab.diagnosis.screening import Screened, coarsely, enough_samples
 from lab.hands import shared
 
 ROUGH = 4
@@ -45,9 +45,11 @@ def refitted(
         (row.theta, (*present.causes, row.hypothesis), None) for row in picked
     ]
     *leading_, rough, whole = work.parts(*[3.0 for _ in shares], 2.0, 3.0)
+    # What leads into the neighbourhood is not yet judged.
+    coarse = replace(coarsely(misfit, present.theta, present.causes), n_train=enough_samples(misfit))
     # Causes are small at first: those who start together share the slopes of the model without them.
-    near = [_Near.at(misfit, theta, present, shares[0] if shares else 0.0) for theta in _starts_of(picked)]
-    coarse = coarsely(misfit, present.theta, present.causes)
+    share, seen = (shares[0], coarse) if shares else (0.0, misfit)
+    near = [_Near.at(seen, theta, present, share) for theta in _starts_of(picked)]
     for share, part in zip(shares, leading_, strict=True):
         led = part.each(
             shared(partial(_led, coarse, share, near), [row[:2] for row in running]), len(running)

@@ -61,6 +61,12 @@ def coarsely(misfit: Misfit, theta: Array, present: Sequence[Hypothesis]) -> Mis
     return misfit if misfit.plant(theta, present).laws else replace(misfit, substeps=SCREEN_SUBSTEPS)
 
 
+def enough_samples(misfit: Misfit, share: float = 1.0) -> tuple[int, ...]:
+    """Training samples of each record that are enough to rank causes by, or a share of them."""
+    most = int(share * min(SCREEN_SAMPLES, SCREEN_VALUES // misfit.measured.shape[0]))
+    return tuple(min(n, most) for n in misfit.n_train)
+
+
 def hypotheses(misfit: Misfit, effects: Mapping[str, type[Effect]]) -> list[Hypothesis]:
     """Every cause at every place from every starting value."""
     survey = misfit.survey
@@ -98,8 +104,7 @@ def screen(
         share: of the samples that are usually looked at.
         places: where each cause that begins at some size is followed, besides the best of all.
     """
-    most = int(share * min(SCREEN_SAMPLES, SCREEN_VALUES // misfit.measured.shape[0]))
-    n_train = tuple(min(n, most) for n in misfit.n_train)
+    n_train = enough_samples(misfit, share)
     glance = Glance.beside(coarsely(misfit, theta, present), theta, tuple(present), observer, n_train)
     looking, following = work.parts(len(proposed), 2 * STEPPED_ON)
     pieces = [proposed[i : i + AT_ONCE] for i in range(0, len(proposed), AT_ONCE)]
