@@ -23,7 +23,6 @@ class Responder:
 
     plant: Plant
     dt: float
-    substeps: int
     matrices: tuple[Array, ...]
     laws: np.ndarray
     parameters: Array
@@ -86,4 +85,4 @@ def ready(plant: Plant, dt: float, *, substeps: int = 6) -> Responder:
     for i, law in enumerate(plant.laws):
         parameters[i, : len(law.parameters)] = law.parameters
     kinds = np.array([law.kind for law in plant.laws], dtype=np.int64)
-    return Responder(plant, dt, sub, transition_of(plant, dt, sub), kinds, parameters)
+    return Responder(plant, dt, transition_of(plant, dt, sub), kinds, parameters)

@@ -8,6 +8,7 @@ import scipy.linalg
 import scipy.signal
 
 from lab import forces, kernel
+from lab.paths import recorded
 from lab.responder import ready
 from lab.twin import twin
 from tests.lab.effects.cases import CASES
@@ -170,6 +171,43 @@ def test_an_observer_is_the_plain_recursion():
         x = step @ np.concatenate([x + gain @ (y[:, k] - expected[:, k]), f])
     found = ready(twin(nominal()).plant, DT).outputs(u, 40, initial=start, observer=gain, measured=y)
     assert error(found, expected) < 1e-12
+
+
+def test_a_sample_is_its_substeps_one_after_the_other():
+    substeps, n = 3, 40
+    late = {"delay": 0.4 * DT}
+    plant = (
+        with_laws("cubic", "quadratic").with_output(0, **late).with_output(3, **late).with_input(1, **late)
+    )
+    responder, u, y = ready(plant, DT, substeps=substeps), pushes(n), pushes(100).reshape(5, n)
+    F, G, P, Q, X, V, *_, at, C, D, E = responder.matrices
+    assert set(at) == {0, 1}
+    (k3, k2), (c2, c3) = LAWS["cubic"][1], LAWS["quadratic"][1]
+
+    def forces_of(x):
+        (extension, _), (_, rate) = X @ x, V @ x
+        return np.array([(k3 * extension + k2) * extension**2, (c2 * abs(rate) + c3 * rate**2) * rate])
+
+    gain = 1e-2 * np.random.default_rng(1).standard_normal((6, 5))
+    gain[:, at > 0] = 0.0
+    x, expected = np.zeros(6), np.empty((n, 5))
+    for k, held in enumerate(responder._driven(u)):
+        g = forces_of(x)
+        read = C @ x + D @ held + E @ g
+        expected[k, at == 0] = read[at == 0]
+        x = x + gain @ (y[:, k] - np.where(at == 0, read, 0.0))
+        g = forces_of(x)
+        for step in range(substeps):
+            if step:
+                expected[k, at == step] = (C @ x + D @ held + E @ g)[at == step]
+            free = F @ x + G[step] @ held + P @ g
+            # Each round brings the forces that end the substep a hundred times nearer.
+            for _ in range(20):
+                g = forces_of(free + Q @ g)
+            x = free + Q @ g
+    expected = recorded(plant.output_paths, (), expected.T.copy(), DT)
+    found = responder.outputs(u, n, observer=gain, measured=y)
+    assert error(found, expected) < 1e-11
 
 
 def test_missing_measurements_pull_nothing():

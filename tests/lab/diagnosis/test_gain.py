@@ -8,6 +8,7 @@ import pytest
 from identification.recording import Record
 from lab.diagnosis import gain
 from lab.diagnosis.gain import _by_the_twin
+from lab.diagnosis.starts import motions_of
 from lab.effects import EFFECTS
 from lab.excitation import Random
 from lab.replay import replay
@@ -55,7 +56,8 @@ def test_what_is_replayed_is_held_against_the_twin(rig, recording, monkeypatch):
         ),
     )
     start = np.array([0.1, 0.0, -0.2, 0.0, 0.3, 0.1])
-    found = gain._simulated(both, rig.dofs, 1e-2, 24, (rig, (None, start)))
+    driven = rig, motions_of(rig, rig.dofs, (None, start))
+    found = gain.simulated(both, driven, accuracy=1e-2, substeps=24)
     for simulated, expected in zip(found, seen, strict=True):
         assert np.sqrt(np.mean((simulated - expected) ** 2)) <= 1e-2 * np.sqrt(np.mean(expected**2))
     assert np.max(np.abs(found[1][:, 0])) > 0.1
