@@ -15,7 +15,7 @@ from matplotlib.axes import Axes
 from matplotlib.backends.backend_svg import FigureCanvasSVG
 from matplotlib.figure import Figure
 from matplotlib.font_manager import findfont, get_font
-from matplotlib.ticker import FuncFormatter, MaxNLocator, NullFormatter
+from matplotlib.ticker import FuncFormatter, MaxNLocator, NullFormatter, NullLocator
 
 WIDTH = 6.7
 """Of every figure [inch]: the text width of A4 with margins of 20 mm."""
@@ -28,6 +28,8 @@ DASHES: tuple[Any, ...] = (
     (0, (8, 3)),
 )
 """Line styles that stay apart in black and white."""
+FEW_DECADES = 1e3
+"""Ratio of the ends of a logarithmic axis beyond which ticks between the decades would be a blur."""
 LOOK: Any = {
     "svg.fonttype": "none",
     "font.family": ["DejaVu Sans"],
@@ -144,11 +146,22 @@ def power_of_ten(value: float, _: int | None = None) -> str:
     return "10" + "".join("⁰¹²³⁴⁵⁶⁷⁸⁹"[int(c)] if c.isdigit() else "⁻" for c in str(exponent))
 
 
+def stacked(figure: Figure, n_rows: int, n_columns: int = 1, **options: Any) -> np.ndarray:
+    """Axes (n_rows, n_columns) of which each column has one x axis, shown at its foot."""
+    frames: np.ndarray = figure.subplots(n_rows, n_columns, sharex="col", squeeze=False, **options)
+    for axes in frames[:-1].ravel():
+        axes.xaxis.set_visible(False)
+    return frames
+
+
 def logarithmic(axes: Axes) -> None:
     """A logarithmic y axis over at most eight decades below the largest value, with about four ticks."""
     axes.set_yscale("log")
     low, high = axes.get_ylim()
-    axes.set_ylim(max(low, high * 1e-8), high)
+    low = max(low, high * 1e-8)
+    axes.set_ylim(low, high)
+    if high > FEW_DECADES * low:
+        axes.yaxis.set_minor_locator(NullLocator())
     axes.yaxis.set_major_formatter(FuncFormatter(power_of_ten))
     axes.yaxis.set_minor_formatter(NullFormatter())
 

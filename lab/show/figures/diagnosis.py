@@ -14,7 +14,7 @@ from identification.recording import Array, Record, Recording
 from lab.diagnosis.outcome import Diagnosis, Prediction
 from lab.show.diagnosed import Diagnosed
 from lab.show.drawing import SERIES
-from lab.show.figures.canvas import Drawing, drawing, few_ticks, logarithmic, plain
+from lab.show.figures.canvas import Drawing, drawing, few_ticks, logarithmic, plain, stacked
 from lab.show.residuals import (
     CLOSE_UP,
     LABELS,
@@ -71,7 +71,7 @@ def predictions(diagnosis: Diagnosis, recording: Recording, rows: list[int]) -> 
     time = np.arange(prediction.measured.shape[1]) / rate
 
     def paint(figure: Figure) -> None:
-        frames = figure.subplots(len(rows), 2, sharex="col", squeeze=False, width_ratios=[1, 1.4])
+        frames = stacked(figure, len(rows), 2, width_ratios=[1, 1.4])
         for (whole, close), row in zip(frames, rows, strict=True):
             _bands(whole, prediction, row, rate, ("measured", models[0], models[-1]))
             whole.axvspan(time[start], time[shown][-1], color="0.88", zorder=0)
@@ -124,7 +124,7 @@ def residuals_over_time(diagnosis: Diagnosis, recording: Recording, rows: list[i
     floor = diagnosis.errors.noise_floor * signal_rms(diagnosis)
 
     def paint(figure: Figure) -> None:
-        frames = figure.subplots(len(rows), 1, sharex=True, squeeze=False)[:, 0]
+        frames = stacked(figure, len(rows))[:, 0]
         for axes, row in zip(frames, rows, strict=True):
             for number, (start, part) in enumerate(zip(starts, parts, strict=False)):
                 for model in shown_models(diagnosis):
@@ -161,7 +161,7 @@ def residuals_over_frequency(diagnosis: Diagnosis, recording: Recording, rows: l
     f = measured.frequency_hz[1:]
 
     def paint(figure: Figure) -> None:
-        frames = figure.subplots(len(rows), 1, sharex=True, squeeze=False)[:, 0]
+        frames = stacked(figure, len(rows))[:, 0]
         for axes, row in zip(frames, rows, strict=True):
             axes.plot(f, _positive(measured.output_density[row, 1:]), label="measured", **MEASURED)
             for model, spectrum in left.items():

@@ -20,6 +20,7 @@ from lab.show.figures.canvas import (
     logarithmic,
     mark_modes,
     plain,
+    stacked,
 )
 from lab.show.signals import Spectra, envelope, measured_inputs, upper_frequency
 
@@ -41,7 +42,7 @@ def time_histories(recording: Recording) -> Drawing:
     strips += [("outputs", row, c) for row, c in enumerate(recording.outputs[:MAX_OUTPUTS])]
 
     def paint(figure: Figure) -> None:
-        frames = figure.subplots(len(strips), 1, sharex=True, squeeze=False)[:, 0]
+        frames = stacked(figure, len(strips))[:, 0]
         for axes, (side, row, channel) in zip(frames, strips, strict=True):
             for start, part in zip(starts, parts, strict=False):
                 signals = getattr(part, side)
@@ -91,7 +92,7 @@ def output_spectra(recording: Recording, spectrum: Spectra, result: Result) -> D
     shown = (spectrum.frequency_hz <= top) & (spectrum.frequency_hz > 0)
 
     def paint(figure: Figure) -> None:
-        frames = figure.subplots(len(units), 1, sharex=True, squeeze=False)[:, 0]
+        frames = stacked(figure, len(units))[:, 0]
         for number, (axes, unit) in enumerate(zip(frames, units, strict=True)):
             rows = [row for row, channel in enumerate(recording.outputs) if channel.unit == unit]
             names = [recording.outputs[row].name for row in rows]

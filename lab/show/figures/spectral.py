@@ -5,7 +5,7 @@ from __future__ import annotations
 from matplotlib.figure import Figure
 
 from lab.diagnosis.outcome import Diagnosis, SpectralPrediction
-from lab.show.figures.canvas import Drawing, drawing, logarithmic, plain
+from lab.show.figures.canvas import Drawing, drawing, logarithmic, plain, stacked
 from lab.show.figures.diagnosis import LOOKS, MEASURED
 from lab.show.residuals import LABELS, shown_models, worst_rows
 
@@ -15,7 +15,7 @@ def draw_spectra(diagnosis: Diagnosis, spectra: SpectralPrediction) -> Drawing:
     rows, models = worst_rows(spectra), shown_models(diagnosis)
 
     def paint(figure: Figure) -> None:
-        frames = figure.subplots(len(rows), 1, sharex=True, squeeze=False)[:, 0]
+        frames = stacked(figure, len(rows))[:, 0]
         for axes, row in zip(frames, rows, strict=True):
             axes.plot(spectra.frequency_hz, spectra.measured[row], label="measured", **MEASURED)
             for model in models:

@@ -11,7 +11,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from lab.show.drawing import SERIES
-from lab.show.figures.canvas import DASHES, Drawing, drawing, few_ticks, logarithmic, plain
+from lab.show.figures.canvas import DASHES, Drawing, drawing, few_ticks, logarithmic, plain, stacked
 from lab.studies.axes import Axis
 from lab.studies.outcome import Outcome
 from lab.studies.statistics import NOMINAL, Statistic
@@ -75,7 +75,7 @@ def arranged(axes: Sequence[Axis]) -> Layout | None:
 
 def _figure(kind: str, caption: str, chosen: Sequence[Statistic], layout: Layout) -> Drawing:
     def paint(figure: Figure) -> None:
-        frames = figure.subplots(len(chosen), 1, sharex=True, squeeze=False)[:, 0]
+        frames = stacked(figure, len(chosen))[:, 0]
         for axes, statistic in zip(frames, chosen, strict=True):
             _curves(axes, statistic, layout)
         _below(frames[-1], layout)
