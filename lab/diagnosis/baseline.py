@@ -12,7 +12,8 @@ from identification.recording import Array
 from lab.diagnosis.calibrate import Calibration
 from lab.diagnosis.colour import colour
 from lab.diagnosis.fit import Fit, fit
-from lab.diagnosis.misfit import Hypothesis, Misfit
+from lab.diagnosis.hypothesis import Hypothesis
+from lab.diagnosis.misfit import Misfit
 
 LEVEL = 1e-3
 """Probability that as little as a baseline leaves is taken for more."""

@@ -10,8 +10,9 @@ import numpy as np
 from identification.progress import UNHEARD, Work
 from identification.recording import Array
 from lab.diagnosis.fit import Fit, fit
-from lab.diagnosis.misfit import Misfit, Parameters
+from lab.diagnosis.misfit import Misfit
 from lab.diagnosis.observer import kalman_gain
+from lab.diagnosis.parameters import Parameters
 from lab.diagnosis.starts import best_starts, moving, starts_of, with_starts
 from lab.diagnosis.whiteness import whiteness
 from lab.effects.survey import Survey

@@ -12,7 +12,8 @@ import numpy as np
 from identification.progress import UNHEARD, Work
 from identification.recording import Array
 from lab.diagnosis.fit import Fit, finite, fit, objective, theta_slopes, weights
-from lab.diagnosis.misfit import Hypothesis, Misfit
+from lab.diagnosis.hypothesis import Hypothesis
+from lab.diagnosis.misfit import Misfit
 from lab.diagnosis.starts import best_starts
 from lab.effects import EFFECTS
 from lab.effects.effect import EVERYWHERE, Effect

@@ -27,8 +27,9 @@ from lab.diagnosis.conclude import calibrated_rig, conclude, nominal_ahead
 from lab.diagnosis.evidence import minus_two_log_evidence
 from lab.diagnosis.fit import Fit
 from lab.diagnosis.gain import held_out_error
-from lab.diagnosis.misfit import Misfit, Parameters
+from lab.diagnosis.misfit import Misfit
 from lab.diagnosis.outcome import Diagnosis
+from lab.diagnosis.parameters import Parameters
 from lab.diagnosis.revise import settled
 from lab.diagnosis.search import search
 from lab.diagnosis.starts import free_decays, with_starts

@@ -8,7 +8,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from identification.recording import Array
-from lab.diagnosis.misfit import Hypothesis, Misfit
+from lab.diagnosis.hypothesis import Hypothesis
+from lab.diagnosis.misfit import Misfit
 from lab.forces import KINKED
 from lab.hands import beside
 from lab.responder import NO_OBSERVER

@@ -11,7 +11,8 @@ import numpy as np
 from identification.recording import Array
 from lab.diagnosis.chance import NO_CHANCE, Chance
 from lab.diagnosis.fit import cause_slopes, moved_by, objective, theta_slopes, weights
-from lab.diagnosis.misfit import Hypothesis, Misfit
+from lab.diagnosis.hypothesis import Hypothesis
+from lab.diagnosis.misfit import Misfit
 from lab.diagnosis.places import tone
 from lab.hands import beside
 

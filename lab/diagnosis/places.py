@@ -7,7 +7,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from identification.recording import Array
-from lab.diagnosis.misfit import Hypothesis
+from lab.diagnosis.hypothesis import Hypothesis
 from lab.effects.effect import EVERYWHERE, Effect
 from lab.effects.survey import Survey
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from lab.diagnosis.misfit import Hypothesis
+from lab.diagnosis.hypothesis import Hypothesis
 
 NEVER = 30.0
 """Yield displacement, in RMS travels of the spring, at which it is a plain spring in all but name."""

@@ -13,7 +13,8 @@ from identification.recording import Array
 from lab.diagnosis.calibrate import Calibration
 from lab.diagnosis.candidate import Candidate, last_of
 from lab.diagnosis.fit import Fit, fit, objective, resumed, theta_slopes
-from lab.diagnosis.misfit import Hypothesis, Misfit
+from lab.diagnosis.hypothesis import Hypothesis
+from lab.diagnosis.misfit import Misfit
 from lab.diagnosis.observer import kalman_gain
 from lab.diagnosis.screening import Screened, coarsely, enough_samples
 from lab.hands import shared

@@ -11,7 +11,8 @@ from identification.progress import UNHEARD, Work
 from identification.recording import Array
 from lab.diagnosis.chance import NO_CHANCE
 from lab.diagnosis.glance import Glance, Look
-from lab.diagnosis.misfit import Hypothesis, Misfit
+from lab.diagnosis.hypothesis import Hypothesis
+from lab.diagnosis.misfit import Misfit
 from lab.effects.effect import Effect
 from lab.hands import shared
 

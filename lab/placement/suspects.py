@@ -12,7 +12,8 @@ from identification.recording import Array, Channel
 from lab.diagnosis.calibrate import parameters_of, survey_of
 from lab.diagnosis.changes import OWN_PARAMETERS
 from lab.diagnosis.fit import theta_slopes
-from lab.diagnosis.misfit import Hypothesis, Misfit
+from lab.diagnosis.hypothesis import Hypothesis
+from lab.diagnosis.misfit import Misfit
 from lab.diagnosis.screening import hypotheses
 from lab.effects import EFFECTS
 from lab.errors import LabError, UnknownNameError

@@ -15,7 +15,6 @@ from identification.response import FrequencyResponse
 from lab.diagnosis.calibrate import Calibration, parameters_of
 from lab.diagnosis.candidate import Candidate
 from lab.diagnosis.conclude import calibrated_rig, calibration_of, effects_of
-from lab.diagnosis.misfit import Parameters
 from lab.diagnosis.outcome import (
     CONSISTENT,
     EXPLAINED,
@@ -26,6 +25,7 @@ from lab.diagnosis.outcome import (
     Finding,
     Quantity,
 )
+from lab.diagnosis.parameters import Parameters
 from lab.diagnosis.spectral.experiment import Experiment
 from lab.diagnosis.spectral.fit import SpectralFit, fit
 from lab.diagnosis.spectral.recorded import Recorded

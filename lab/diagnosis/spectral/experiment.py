@@ -6,8 +6,8 @@ from collections.abc import Mapping
 from typing import Any, Protocol
 
 from identification.recording import Array
-from lab.diagnosis.misfit import Parameters
 from lab.diagnosis.outcome import SpectralPrediction
+from lab.diagnosis.parameters import Parameters
 from lab.diagnosis.spectral.tones import FoundTone
 from lab.diagnosis.spectral.transfer import Complex
 from lab.effects.effect import Effect

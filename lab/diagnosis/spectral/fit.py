@@ -9,7 +9,7 @@ import numpy as np
 
 from identification.recording import Array
 from lab.diagnosis.fit import CAUSE_STEP, moved_by
-from lab.diagnosis.misfit import Hypothesis
+from lab.diagnosis.hypothesis import Hypothesis
 from lab.diagnosis.spectral.likelihood import Likelihood
 from lab.diagnosis.spectral.transfer import Complex
 

@@ -10,7 +10,8 @@ from collections.abc import Sequence
 from typing import Protocol
 
 from identification.recording import Array
-from lab.diagnosis.misfit import Hypothesis, Parameters
+from lab.diagnosis.hypothesis import Hypothesis
+from lab.diagnosis.parameters import Parameters
 from lab.diagnosis.spectral.neighbourhood import Neighbourhood
 from lab.diagnosis.spectral.transfer import Complex
 from lab.effects.survey import Survey

@@ -9,7 +9,7 @@ import numpy as np
 
 from identification.recording import Array
 from lab.diagnosis.fit import STEP
-from lab.diagnosis.misfit import Hypothesis
+from lab.diagnosis.hypothesis import Hypothesis
 from lab.diagnosis.spectral.transfer import Complex
 
 

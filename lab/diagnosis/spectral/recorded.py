@@ -8,8 +8,8 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from identification.recording import Array, Recording
-from lab.diagnosis.misfit import Parameters
 from lab.diagnosis.outcome import SpectralPrediction
+from lab.diagnosis.parameters import Parameters
 from lab.diagnosis.spectral.ambient import Ambient, pushed, started
 from lab.diagnosis.spectral.fit import SpectralFit
 from lab.diagnosis.spectral.goodness import averaged, goodness, grouped

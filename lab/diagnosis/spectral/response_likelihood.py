@@ -8,7 +8,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from identification.recording import Array
-from lab.diagnosis.misfit import Hypothesis, Parameters
+from lab.diagnosis.hypothesis import Hypothesis
+from lab.diagnosis.parameters import Parameters
 from lab.diagnosis.spectral.likelihood import explained
 from lab.diagnosis.spectral.nearby import Nearby, shares_of
 from lab.diagnosis.spectral.neighbourhood import Neighbourhood, Stepwise, Trial

@@ -10,8 +10,8 @@ import scipy.special
 
 from identification.recording import Array
 from identification.response import FrequencyResponse
-from lab.diagnosis.misfit import Parameters
 from lab.diagnosis.outcome import SpectralPrediction
+from lab.diagnosis.parameters import Parameters
 from lab.diagnosis.spectral.fit import SpectralFit
 from lab.diagnosis.spectral.lesson import Lesson, lesson_of
 from lab.diagnosis.spectral.motion import survey_of

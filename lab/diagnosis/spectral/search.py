@@ -11,7 +11,7 @@ import numpy as np
 from identification.recording import Array
 from lab.diagnosis.candidate import Candidate
 from lab.diagnosis.evidence import minus_two_log_evidence
-from lab.diagnosis.misfit import Hypothesis
+from lab.diagnosis.hypothesis import Hypothesis
 from lab.diagnosis.plausible import plausible
 from lab.diagnosis.screening import hypotheses
 from lab.diagnosis.spectral.changes import changes

@@ -8,7 +8,8 @@ import pytest
 import lab
 from identification.recording import Record
 from lab.diagnosis.calibrate import parameters_of, survey_of
-from lab.diagnosis.misfit import Hypothesis, Misfit
+from lab.diagnosis.hypothesis import Hypothesis
+from lab.diagnosis.misfit import Misfit
 from lab.effects import EFFECTS
 from lab.twin import twin
 from tests.lab.structures import chain_xml

@@ -6,7 +6,8 @@ import pytest
 from lab.diagnosis.calibrate import calibrate, parameters_of
 from lab.diagnosis.conclude import calibrated_rig
 from lab.diagnosis.fit import theta_slopes, weights
-from lab.diagnosis.misfit import Misfit, Parameters
+from lab.diagnosis.misfit import Misfit
+from lab.diagnosis.parameters import Parameters
 from lab.effects.stiffness_change import StiffnessChange
 from lab.excitation import Random
 from lab.instruments import instrument

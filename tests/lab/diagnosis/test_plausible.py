@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from lab.diagnosis.misfit import Hypothesis
+from lab.diagnosis.hypothesis import Hypothesis
 from lab.diagnosis.plausible import plausible
 from lab.effects import EFFECTS
 from lab.effects.survey import Guess

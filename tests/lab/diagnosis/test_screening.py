@@ -7,7 +7,8 @@ import pytest
 
 from identification.recording import Record, Recording
 from lab.diagnosis.calibrate import parameters_of
-from lab.diagnosis.misfit import Misfit, Parameters
+from lab.diagnosis.misfit import Misfit
+from lab.diagnosis.parameters import Parameters
 from lab.diagnosis.screening import Screened, Screening, coarsely
 from lab.forces import CUBIC
 from lab.rig import Rig

@@ -6,8 +6,9 @@ import numpy as np
 import pytest
 
 from lab.diagnosis.calibrate import parameters_of
-from lab.diagnosis.misfit import LOOSE, Hypothesis
+from lab.diagnosis.hypothesis import Hypothesis
 from lab.diagnosis.outcome import CONSISTENT, EXPLAINED
+from lab.diagnosis.parameters import LOOSE
 from lab.diagnosis.plausible import plausible
 from lab.diagnosis.spectral.diagnose import diagnose_spectra
 from lab.diagnosis.spectral.fit import fit

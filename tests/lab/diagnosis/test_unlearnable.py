@@ -6,8 +6,9 @@ import numpy as np
 import pytest
 
 from lab.diagnosis.fit import Fit, fit
-from lab.diagnosis.misfit import Misfit, Parameters
+from lab.diagnosis.misfit import Misfit
 from lab.diagnosis.noise import noise_of
+from lab.diagnosis.parameters import Parameters
 from lab.diagnosis.unlearnable import unlearnable
 from lab.excitation import Random
 from lab.instruments import instrument
