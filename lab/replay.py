@@ -88,11 +88,11 @@ def _refined(
     rig: Rig, respond: Respond, dt: float, duration: float, accuracy: float, expected: Array | None
 ) -> Array:
     """Outputs that are what was expected, or as accurate as asked for, or nearly so."""
-    guess = None if expected is None else first_guess(rig, dt, accuracy, duration)
-    if expected is not None and guess is not None and not guess.cancelled:
+    if expected is not None:
+        guess = first_guess(rig, dt, accuracy, duration)
         with suppress(LabError):
-            coarse = _outputs(respond(substeps=guess.substeps))
-            if _agree(coarse, expected, accuracy):
+            coarse = None if guess.cancelled else _outputs(respond(substeps=guess.substeps))
+            if coarse is not None and _agree(coarse, expected, accuracy):
                 return coarse
     for allowed in (accuracy, 10 * accuracy, 100 * accuracy, 0.9):
         try:
