@@ -62,7 +62,7 @@ def diagnose_file(
         progress: told what is being done, and the share of it that is done; it falls where the search goes on.
 
     Returns:
-        The diagnosis, and what it was found in, with channels as the model names them.
+        The diagnosis, and what it was found in, with channels as the model names them and without those that never change.
 
     Raises:
         UnknownNameError: a width or an effect is of nothing that exists.
@@ -83,6 +83,7 @@ def diagnose_file(
             effects=_effects(effects),
             progress=None if progress is None else diagnosing,
         )
+        recording = recording.select(outputs=[channel.name for channel in diagnosis.nominal.outputs])
         facts = _facts({"Recording": path, "Model": model, "Baseline": baseline, "Names": mapping})
         present_diagnosis(folder, diagnosis, recording, command=command, facts=facts, work=writing)
     return diagnosis, recording

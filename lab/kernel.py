@@ -1,8 +1,9 @@
 """Kernel: responses of a linear structure with a few local force laws, sample by sample, compiled.
 
 Between samples the linear part is exact (matrix exponential); the force of a law is taken as a straight line over each
-substep and solved for implicitly at its end, which is of second order in the substep and stable for stiff laws. The same
-function runs uncompiled as `respond.py_func`. Compiled sums may be taken in another order, several terms at once.
+substep and solved for implicitly at its end, which is of second order in the substep and stable as long as the law alone
+swings less than half a turn in one (the linear acceleration method, Newmark 1959). The same function runs uncompiled as
+`respond.py_func`. Compiled sums may be taken in another order, several terms at once.
 """
 
 from __future__ import annotations
@@ -284,15 +285,23 @@ def respond(F, G, P, Q, X, V, S, T, R, at, C, D, E, laws, params, u, x0, n_recor
                     elif laws[e] == COULOMB:
                         g[e] = _rounded(params[e], v_end, a_v)
                     elif laws[e] == BOUC_WEN:
-                        # Newton: the force bends over a substep, and following it alone creeps where the spring is stiff.
+                        # Newton inside a shrinking bracket: following the force alone creeps where the spring is stiff.
                         trial, bend = g[e], 0.5 / params[e, 1]
-                        for _ in range(12):
+                        high = 4 * (params[e, 0] * params[e, 1] + abs(z[e]))
+                        low = -high
+                        for _ in range(60):
                             dx, mean = x_end + a_x * trial - xs[e], 0.5 * (z[e] + trial)
                             # |dx| z + dx |z| is nothing where their signs differ.
                             alike = 2.0 if (dx > 0) == (mean > 0) else 0.0
                             level, way = alike * abs(mean), alike * abs(dx)
                             error = z[e] + params[e, 0] * dx - bend * dx * level - trial
+                            if error > 0:
+                                low = trial
+                            else:
+                                high = trial
                             change = error / (1 - a_x * (params[e, 0] - bend * level) + 0.5 * bend * way)
+                            if not low <= trial + change <= high:
+                                change = 0.5 * (low + high) - trial
                             trial += change
                             if abs(change) <= 1e-13 * abs(trial):
                                 break

@@ -281,6 +281,7 @@ def _diagnosed(
     # Titled before, so that the report names the test.
     recording = replace(recording, title=scenario.title)
     diagnosis = diagnose(recording, model_of(scenario), widths=asked.widths, progress=progress)
+    recording = recording.select(outputs=[channel.name for channel in diagnosis.nominal.outputs])
     folder.mkdir()
     facts = {
         "Scenario": f"{scenario.title}; word for word in report.html of the folder above",

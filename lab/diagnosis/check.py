@@ -8,6 +8,7 @@ import numpy as np
 
 from identification.modes import Modes
 from identification.recording import Array, Recording
+from lab.errors import LabError
 from lab.rig import Rig
 
 QUIET = 0.01
@@ -35,15 +36,52 @@ def check(recording: Recording, rig: Rig) -> tuple[str, ...]:
     )
 
 
+def living(recording: Recording, baseline: Recording | None = None) -> tuple[Recording, tuple[str, ...]]:
+    """The recording without outputs that never change, there or in a baseline, and a sentence on those left out.
+
+    Raises:
+        LabError: no output changes, or nothing ever pushes a structure that does not decay freely either.
+    """
+    names = [channel.name for channel in recording.outputs]
+    dead = {
+        channel.name
+        for each in (recording, *(() if baseline is None else (baseline,)))
+        for channel, moved in zip(each.outputs, _changing(each, "outputs"), strict=True)
+        if not moved
+    }
+    kept, dropped = ([name for name in names if (name in dead) is out] for out in (False, True))
+    if not kept:
+        raise LabError("no output ever changes; expected signals: check how the recording was made")
+    driven = [record for record in recording.records if record.inputs.shape[0]]
+    decays = len(driven) < len(recording.records) or any(record.kind == "free_decay" for record in driven)
+    if not decays and not np.any(_changing(recording, "inputs")):
+        raise LabError(
+            f"input {listed([channel.name for channel in recording.inputs])} never changes: nothing pushes; expected measured "
+            "forces, or records of kind 'free_decay'"
+        )
+    if not dropped:
+        return recording, ()
+    said = f"output {listed(dropped)} never changes: it was left out; check the channel"
+    return recording.select(outputs=kept), (said,)
+
+
+def _changing(recording: Recording, side: str) -> np.ndarray:
+    """Whether each channel of a side changes in any record."""
+    moves = np.zeros(len(getattr(recording, side)), dtype=bool)
+    for record in recording.records:
+        if getattr(record, side).shape[0]:
+            signal = np.asarray(getattr(record, side)[:, :])
+            known = ~np.isnan(signal)
+            lowest = np.min(signal, axis=1, where=known, initial=np.inf)
+            moves |= np.max(signal, axis=1, where=known, initial=-np.inf) > lowest
+    return moves
+
+
 def _dead_channels(recording: Recording) -> list[str]:
     """Channels that never move."""
     said = []
     for side in ("inputs", "outputs"):
-        moves = np.zeros(len(getattr(recording, side)), dtype=bool)
-        for record in recording.records:
-            if getattr(record, side).shape[0]:
-                signal = np.nan_to_num(np.asarray(getattr(record, side)[:, :]))
-                moves |= np.ptp(signal, axis=1) > 0
+        moves = _changing(recording, side)
         dead = [c.name for c, moved in zip(getattr(recording, side), moves, strict=True) if not moved]
         if dead:
             said.append(

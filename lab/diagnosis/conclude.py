@@ -174,7 +174,10 @@ def conclude(
 
 
 def nominal_ahead(state: State, recording: Recording, nominal: Rig) -> Callable[[], list[Array]]:
-    """How to get the outputs of the nominal rig, which a helper simulates while this process goes on."""
+    """How to get the outputs of the nominal rig, which a helper simulates while this process goes on.
+
+    They are as accurate as the noise asks for that the fit so far leaves.
+    """
     misfit = state.misfit
     return meanwhile(
         simulated,

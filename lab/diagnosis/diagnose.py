@@ -23,6 +23,7 @@ from lab.diagnosis.bending import bent
 from lab.diagnosis.calibrate import calibrate, parameters_of
 from lab.diagnosis.candidate import Candidate
 from lab.diagnosis.changes import OWN_CHANGES
+from lab.diagnosis.check import living
 from lab.diagnosis.conclude import calibrated_rig, conclude, nominal_ahead
 from lab.diagnosis.evidence import minus_two_log_evidence
 from lab.diagnosis.fit import Fit
@@ -64,7 +65,7 @@ def diagnose(
     """What the model gets wrong in this recording, and the model that does not.
 
     Args:
-        recording: measured outputs and inputs.
+        recording: measured outputs and inputs; outputs that never change are left out.
         rig: what the engineer believes; its channels must have the names of the recording's.
         baseline: of the same rig in its known state; it calibrates the model first.
         widths: prior standard deviations, relative, by group ("mass", "stiffness", "damping", "gain") or parameter; gains of
@@ -75,12 +76,16 @@ def diagnose(
     Raises:
         LabError: recording and model do not fit together, or the recording has no measured input.
     """
+    recording, left_out = living(recording, baseline)
     if all(record.kind == "ambient" and not record.inputs.shape[0] for record in recording.records):
         from lab.diagnosis.spectral.diagnose import diagnose_spectra
 
-        return diagnose_spectra(
+        if baseline is not None:
+            baseline = baseline.select(outputs=[channel.name for channel in recording.outputs])
+        seen = diagnose_spectra(
             recording, rig, baseline=baseline, widths=widths, effects=effects, progress=progress
         )
+        return replace(seen, unlearnable=(*left_out, *seen.unlearnable))
     before, whole = Work(progress).parts(0.0 if baseline is None else COSTS[0], sum(COSTS))
     calibrating, searching, accepting, concluding = whole.parts(*COSTS)
     nominal = _connected(rig, recording)
@@ -134,7 +139,8 @@ def diagnose(
     left = _left(state)
     told = concluding.called("simulating what was found")
     as_given = as_given or nominal_ahead(state, recording, nominal)
-    return conclude(state, recording, nominal, rig, first, left, known, refused, as_given, told)
+    diagnosis = conclude(state, recording, nominal, rig, first, left, known, refused, as_given, told)
+    return replace(diagnosis, unlearnable=(*left_out, *diagnosis.unlearnable))
 
 
 def _left(state: State) -> Whiteness:

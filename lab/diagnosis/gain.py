@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+import itertools
+from collections.abc import Callable, Iterator, Sequence
 from functools import partial
 
 import numpy as np
@@ -45,14 +46,19 @@ def predictions_of(
         work: told of every rig.
     """
     # Never in two threads: MuJoCo's callbacks belong to the whole process.
-    each = shared(partial(simulated, recording, accuracy=accuracy, substeps=misfit.substeps), driven)
-    calibrated, extended = work.each(each, len(driven))
+    outputs = shared(partial(simulated, recording, accuracy=accuracy, substeps=misfit.substeps), driven)
+    calibrated, extended, as_given = work.each(itertools.chain(outputs, _called(nominal)), len(driven) + 1)
     return tuple(
-        Prediction(measured, as_given, before, after, first)
-        for (_, measured), as_given, before, after, first in zip(
-            misfit.records, nominal(), calibrated, extended, misfit.n_train, strict=True
+        Prediction(measured, given, before, after, first)
+        for (_, measured), given, before, after, first in zip(
+            misfit.records, as_given, calibrated, extended, misfit.n_train, strict=True
         )
     )
+
+
+def _called(outcome: Callable[[], list[Array]]) -> Iterator[list[Array]]:
+    """An outcome, asked for when its turn comes."""
+    yield outcome()
 
 
 def simulated(recording: Recording, driven: Driven, *, accuracy: float, substeps: int) -> list[Array]:

@@ -172,7 +172,7 @@ def steadied(calibration: Calibration, candidates: list[Candidate], without: flo
     assert guided is not None
     if not misfit.plant(guided.theta, guided.causes).laws:
         return candidates
-    # It was led with few substeps, and is held against a fit with as many as fits take.
+    # It was led with few substeps and samples, and is held against a fit with as many as fits take.
     left = misfit.residual(guided.theta, guided.causes, observer=guided.observer)
     if first.fit.objective <= objective(left, guided.theta, guided.precision, misfit.colour):
         return candidates

@@ -24,6 +24,8 @@ STEPPED_ON, PLACES = 40, 8
 begin far off, and would not show beside causes that begin at none."""
 AT_ONCE = 16
 """Hypotheses that are looked at in one piece of work."""
+QUIET = 0.5
+"""Power of the head of a record over that of the whole below which it tells too little: an impact may come late."""
 SCREEN_VALUES = 32768
 """Samples of all outputs together that are enough to rank causes by."""
 
@@ -63,9 +65,14 @@ def coarsely(misfit: Misfit, theta: Array, present: Sequence[Hypothesis]) -> Mis
 
 
 def enough_samples(misfit: Misfit, share: float = 1.0) -> tuple[int, ...]:
-    """Training samples of each record that are enough to rank causes by, or a share of them."""
+    """Training samples of each record that are enough to rank causes by, or a share of them; all where its head is quiet."""
     most = int(share * min(SCREEN_SAMPLES, SCREEN_VALUES // misfit.measured.shape[0]))
-    return tuple(min(n, most) for n in misfit.n_train)
+    found = []
+    for (_, measured), n in zip(misfit.records, misfit.n_train, strict=True):
+        power = [np.nansum(measured[:, :k] ** 2, axis=1) / k for k in (min(n, most), n)]
+        quiet = np.median(power[0] / np.maximum(power[1], 1e-300)) < QUIET
+        found.append(n if quiet else min(n, most))
+    return tuple(found)
 
 
 def hypotheses(misfit: Misfit, effects: Mapping[str, type[Effect]]) -> list[Hypothesis]:

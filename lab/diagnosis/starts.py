@@ -98,18 +98,16 @@ def motions_of(
 
     What has been added to a structure moves along with what it is tied to.
     """
+    if all(start is None for start in starts):
+        return [None] * len(starts)
     known = [rig.dofs.index(name) for name in dofs]
     added = [i for i in range(len(rig.dofs)) if i not in known]
     K = rig.second_order().stiffness
-    carried = -np.linalg.lstsq(K[np.ix_(added, added)], K[np.ix_(added, known)], rcond=None)[0]
-    found: list[tuple[Array, Array] | None] = []
-    for start in starts:
-        motion = np.zeros((2, len(rig.dofs)))
-        for row, part in zip(motion, () if start is None else np.split(start, 2), strict=False):
-            row[known] = part
-            row[added] = carried @ part
-        found.append(None if start is None else (motion[0], motion[1]))
-    return found
+    everywhere = np.zeros((len(rig.dofs), len(known)))
+    everywhere[known] = np.eye(len(known))
+    everywhere[added] = -np.linalg.lstsq(K[np.ix_(added, added)], K[np.ix_(added, known)], rcond=None)[0]
+    halves = (None if start is None else np.split(start, 2) for start in starts)
+    return [None if half is None else (everywhere @ half[0], everywhere @ half[1]) for half in halves]
 
 
 def _swings(plant: Plant, dt: float, n_samples: int) -> Array:

@@ -6,7 +6,8 @@ import numpy as np
 import pytest
 
 from identification.recording import Record, Recording
-from lab.diagnosis.check import check, listed
+from lab.diagnosis.check import check, listed, living
+from lab.errors import LabError
 from lab.rig import Rig
 from tests.lab.structures import chain_xml
 
@@ -43,6 +44,30 @@ def test_a_channel_that_never_moves(rig):
     y[0] = 3.0
     (said,) = check(replace(good, records=(replace(good.records[0], outputs=y),)), rig)
     assert said.startswith("output acc0.x never changes")
+
+
+@pytest.mark.parametrize("value", [0.0, 3.0, np.nan])
+def test_an_output_that_never_changes_is_left_out(rig, value):
+    good = recorded(rig, white())
+    assert living(good) == (good, ())
+    y = np.array(good.records[0].outputs)
+    y[0], y[1, 7] = value, np.nan
+    broken = replace(good, records=(replace(good.records[0], outputs=y),))
+    for kept, said in (living(broken), living(good, broken)):
+        assert [channel.name for channel in kept.outputs] == ["pos1"]
+        assert said == ("output acc0.x never changes: it was left out; check the channel",)
+
+
+def test_nothing_that_changes_is_refused(rig):
+    good = recorded(rig, white())
+    still = replace(good.records[0], outputs=np.zeros((2, N)))
+    with pytest.raises(LabError, match="no output ever changes"):
+        living(replace(good, records=(still,)))
+    unmoved = replace(good.records[0], inputs=np.zeros((2, N)))
+    with pytest.raises(LabError, match=r"input force0 and force1 never changes.*free_decay"):
+        living(replace(good, records=(unmoved,)))
+    decay = replace(unmoved, kind="free_decay")
+    assert living(replace(good, records=(unmoved, decay)))[1] == ()
 
 
 def test_modes_beyond_half_the_sample_rate(rig):

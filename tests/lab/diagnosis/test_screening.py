@@ -9,7 +9,7 @@ from identification.recording import Record, Recording
 from lab.diagnosis.calibrate import parameters_of
 from lab.diagnosis.misfit import Misfit
 from lab.diagnosis.parameters import Parameters
-from lab.diagnosis.screening import Screened, Screening, coarsely
+from lab.diagnosis.screening import SCREEN_SAMPLES, Screened, Screening, coarsely, enough_samples
 from lab.forces import CUBIC
 from lab.rig import Rig
 from lab.twin import twin
@@ -33,6 +33,19 @@ def test_substeps_are_few_where_no_law_is_present(misfit):
     plant = misfit.twin.plant.with_law(CUBIC, np.eye(3)[0], 1.0, 0.0)
     bent = replace(misfit, twin=replace(misfit.twin, plant=plant))
     assert coarsely(bent, theta, ()).substeps == misfit.substeps
+
+
+def test_samples_are_few_unless_the_head_of_a_record_is_quiet(misfit):
+    n = 2 * SCREEN_SAMPLES
+    even = np.random.default_rng(0).standard_normal((1, n))
+    late = even * (np.arange(n) > SCREEN_SAMPLES + 100)
+    quiet = even * np.where(np.arange(n) > SCREEN_SAMPLES, 1.0, 0.1)
+    gaps = np.where(np.arange(n) % 3, even, np.nan)
+    signals = (even, late, quiet, gaps, even[:, :10])
+    records = tuple((np.zeros((1, y.shape[1])), y) for y in signals)
+    several = replace(misfit, records=records, n_train=tuple(y.shape[1] for y in signals))
+    assert enough_samples(several) == (SCREEN_SAMPLES, n, n, SCREEN_SAMPLES, 10)
+    assert enough_samples(several, 0.5) == (SCREEN_SAMPLES // 2, n, n, SCREEN_SAMPLES // 2, 10)
 
 
 def row(score):
