@@ -8,6 +8,7 @@ import numpy as np
 
 from identification.modes import Modes
 from identification.recording import Array, Recording
+from lab.diagnosis.misfit import SHARE
 from lab.errors import LabError
 from lab.rig import Rig
 
@@ -16,6 +17,8 @@ QUIET = 0.01
 COLLINEAR = 1e-6
 """Smallest over largest singular value of the inputs, each of unit power, below which they count as one."""
 LISTED = 5
+LEAST = 100
+"""Samples below which neither noise nor a fit can be judged: noise is told from thirty samples of its own past."""
 
 
 def check(recording: Recording, rig: Rig) -> tuple[str, ...]:
@@ -39,25 +42,38 @@ def check(recording: Recording, rig: Rig) -> tuple[str, ...]:
 def living(recording: Recording, baseline: Recording | None = None) -> tuple[Recording, tuple[str, ...]]:
     """The recording without outputs that never change, there or in a baseline, and a sentence on those left out.
 
+    What fits do not see does not count: a channel must change in the first `SHARE` of a record.
+
     Raises:
-        LabError: no output changes, or nothing ever pushes a structure that does not decay freely either.
+        LabError: a force is missing, a sample infinite; or there are too few samples, no output changes, nothing pushes a
+            structure that does not decay freely either, or nothing is left to keep aside.
     """
+    _all_known(recording)
+    n = sum(int(SHARE * record.n_samples) for record in recording.records)
+    if n < LEAST:
+        raise LabError(f"fits would see {n} samples; expected at least {LEAST}: record longer")
     names = [channel.name for channel in recording.outputs]
     dead = {
         channel.name
         for each in (recording, *(() if baseline is None else (baseline,)))
-        for channel, moved in zip(each.outputs, _changing(each, "outputs"), strict=True)
+        for channel, moved in zip(each.outputs, _changing(each, "outputs", SHARE), strict=True)
         if not moved
     }
     kept, dropped = ([name for name in names if (name in dead) is out] for out in (False, True))
+    part = f"in the first {100 * SHARE:g} % of any record, which is what fits see"
     if not kept:
-        raise LabError("no output ever changes; expected signals: check how the recording was made")
+        raise LabError(f"no output ever changes {part}; expected signals: check how the recording was made")
     driven = [record for record in recording.records if record.inputs.shape[0]]
     decays = len(driven) < len(recording.records) or any(record.kind == "free_decay" for record in driven)
-    if not decays and not np.any(_changing(recording, "inputs")):
+    if not decays and not np.any(_changing(recording, "inputs", SHARE)):
         raise LabError(
-            f"input {listed([channel.name for channel in recording.inputs])} never changes: nothing pushes; expected measured "
-            "forces, or records of kind 'free_decay'"
+            f"input {listed([channel.name for channel in recording.inputs])} never changes {part}; expected measured forces, "
+            "or records of kind 'free_decay'"
+        )
+    if not any(np.any(~np.isnan(r.outputs[:, int(SHARE * r.n_samples) :])) for r in recording.records):
+        raise LabError(
+            f"every output sample behind the first {100 * SHARE:g} % of each record is missing; some must be left to keep "
+            "aside: cut the recording where it ends"
         )
     if not dropped:
         return recording, ()
@@ -65,12 +81,27 @@ def living(recording: Recording, baseline: Recording | None = None) -> tuple[Rec
     return recording.select(outputs=kept), (said,)
 
 
-def _changing(recording: Recording, side: str) -> np.ndarray:
-    """Whether each channel of a side changes in any record."""
+def _all_known(recording: Recording) -> None:
+    """Raises LabError where a force is missing or a sample is infinite; outputs may be missing."""
+    for number, record in enumerate(recording.records):
+        for side, lost in (("inputs", np.isnan), ("outputs", np.isinf), ("inputs", np.isinf)):
+            signal = np.asarray(getattr(record, side)[:, :])
+            wrong = np.argwhere(lost(signal))
+            if len(wrong):
+                row, sample = wrong[0]
+                what = "missing" if lost is np.isnan else "infinite"
+                raise LabError(
+                    f"{side[:-1]} {getattr(recording, side)[row].name} is {what} in sample {sample} of record {number}; "
+                    "expected every force, and finite numbers: mend it, or cut the recording there"
+                )
+
+
+def _changing(recording: Recording, side: str, share: float = 1.0) -> np.ndarray:
+    """Whether each channel of a side changes in the first share of any record."""
     moves = np.zeros(len(getattr(recording, side)), dtype=bool)
     for record in recording.records:
         if getattr(record, side).shape[0]:
-            signal = np.asarray(getattr(record, side)[:, :])
+            signal = np.asarray(getattr(record, side)[:, : int(share * record.n_samples)])
             known = ~np.isnan(signal)
             lowest = np.min(signal, axis=1, where=known, initial=np.inf)
             moves |= np.max(signal, axis=1, where=known, initial=-np.inf) > lowest

@@ -147,6 +147,8 @@ def noise_floor(residual: Array, measured: Array) -> float:
     """Share of a signal that is noise: what of a residual cannot be predicted from its own past."""
     shares = []
     for e, y in zip(residual, measured, strict=True):
+        if np.all(np.isnan(y)):
+            continue
         rows = np.lib.stride_tricks.sliding_window_view(e, PAST + 1)
         weights = np.linalg.lstsq(rows[:, :PAST], rows[:, PAST], rcond=None)[0]
         innovation = rows[:, PAST] - rows[:, :PAST] @ weights

@@ -16,8 +16,10 @@ from lab.plant import Plant
 from lab.responder import NO_OBSERVER, ready
 from lab.twin import Twin
 
+SHARE = 0.7
+"""Of every record, from its start, that fits may see: what follows is kept for the gain."""
 ENERGY = 0.98
-"""Share of the energy of a free decay that fits may see: what follows is kept for the gain."""
+"""Share of the energy of a free decay that fits may see, if that comes sooner."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -47,7 +49,7 @@ class Misfit:
     bend: tuple[Array, ...] = ()
 
     @classmethod
-    def of(cls, recording: Recording, twin: Twin, parameters: Parameters, *, share: float = 0.7) -> Misfit:
+    def of(cls, recording: Recording, twin: Twin, parameters: Parameters, *, share: float = SHARE) -> Misfit:
         """The misfit of a recording whose channels are those of the twin."""
         records = tuple(
             (_inputs(r, len(recording.inputs)), np.asarray(r.outputs[:, :])) for r in recording.records
