@@ -78,4 +78,6 @@ class Baseline:
 
 
 def _power(misfit: Misfit, found: Fit) -> Array:
-    return np.asarray(np.mean(found.residual**2, axis=1) / np.nanmean(misfit.measured**2, axis=1))
+    return np.asarray(
+        np.mean(misfit.made_whole(found.residual) ** 2, axis=1) / np.nanmean(misfit.measured**2, axis=1)
+    )

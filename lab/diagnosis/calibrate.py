@@ -78,7 +78,7 @@ def calibrate(misfit: Misfit, rig: Rig, work: Work = UNHEARD) -> Calibration:
     """The most likely parameters of the model as it is, without any cause."""
     theta = np.zeros(misfit.parameters.n)
     direct = fit(misfit, theta, iterations=20)
-    if whiteness(direct.residual, misfit.driven).white:
+    if whiteness(direct.residual, misfit.driven, missing=np.isnan(misfit.measured)).white:
         # Where nothing but noise is left, no detour would end anywhere better.
         misfit = replace(misfit, survey=survey_of(misfit, rig, direct.theta, direct.residual))
         return Calibration(misfit, direct, direct, 0.0)

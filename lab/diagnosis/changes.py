@@ -143,7 +143,7 @@ def _windowed(misfit: Misfit) -> Misfit:
 def _level(misfit: Misfit, present: Fit, theta: Array, causes: Sequence[Hypothesis]) -> float:
     """-2 log posterior of parameters and causes."""
     e = misfit.residual(theta, causes, observer=present.observer)
-    return objective(e, theta, misfit.parameters.precision, misfit.colour)
+    return objective(e, theta, misfit.parameters.precision, misfit.counting_as_one())
 
 
 def _started_again(misfit: Misfit, present: Fit, level: float, theta: Array) -> tuple[float, Array]:
@@ -152,7 +152,7 @@ def _started_again(misfit: Misfit, present: Fit, level: float, theta: Array) -> 
     P = misfit.parameters.precision[unknown.start :, unknown.start :]
     for _ in range(RESTARTS if np.isfinite(level) else 0):
         e = misfit.residual(theta, present.causes, observer=present.observer)
-        w = weights(e, misfit.colour)[:, None]
+        w = weights(e, misfit.counting_as_one())[:, None]
         J = finite(theta_slopes(misfit, theta, present.causes, present.observer, e, None, unknown))
         A = (J * w).reshape(len(J), -1)
         moved, gradient = theta.copy(), A @ (e * w).ravel() + P @ theta[unknown]

@@ -168,7 +168,7 @@ def conclude(
         nominal,
         extended,
         tuple(warnings),
-        noise=noise_of(state.fit.residual, recording),
+        noise=noise_of(misfit.made_whole(state.fit.residual), recording),
         unlearnable=(*check(recording, nominal), *unlearnable(state.misfit, state.fit)),
     )
 
@@ -203,7 +203,7 @@ def extended_rig(state: State, rig: Rig) -> Rig:
 
 def floor_of(state: State) -> float:
     """Noise over signal, as the fit so far leaves it."""
-    return noise_floor(state.fit.residual, held_out(state.misfit))
+    return noise_floor(state.misfit.made_whole(state.fit.residual), held_out(state.misfit))
 
 
 def accuracy_below(floor: float) -> float:

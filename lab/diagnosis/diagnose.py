@@ -145,8 +145,9 @@ def diagnose(
 
 def _left(state: State) -> Whiteness:
     """What the fit so far leaves."""
-    residual = state.fit.residual
-    return whiteness(residual, state.misfit.driven, state.misfit.measured - residual)
+    residual, misfit = state.fit.residual, state.misfit
+    missing = np.isnan(misfit.measured)
+    return whiteness(residual, misfit.driven, misfit.measured - residual, missing=missing)
 
 
 def _begun(

@@ -60,20 +60,20 @@ class Fit:
         return np.asarray(np.linalg.pinv(total, rcond=1e-14, hermitian=True), dtype=np.float64)
 
 
-def objective(residual: Array, theta: Array, precision: Array, colour: float = 1.0) -> float:
-    """-2 log posterior with the noise of every channel at its most likely level; `colour` samples count as one."""
+def objective(residual: Array, theta: Array, precision: Array, counted: float | Array = 1.0) -> float:
+    """-2 log posterior with the noise of every channel at its most likely level; `counted` samples count as one."""
     # A trial far from any sense may overflow before it diverges.
     with np.errstate(over="ignore"):
         power = np.mean(residual**2, axis=1)
     if not np.all(np.isfinite(power)):
         return np.inf
-    n = residual.shape[1] / colour
-    return float(n * np.sum(np.log(np.maximum(power, 1e-300))) + theta @ precision @ theta)
+    levels = residual.shape[1] / counted * np.log(np.maximum(power, 1e-300))
+    return float(np.sum(levels) + theta @ precision @ theta)
 
 
-def weights(residual: Array, colour: float = 1.0) -> Array:
-    """One over the residual's RMS, per channel; `colour` samples count as one."""
-    return 1 / np.sqrt(np.maximum(colour * np.mean(residual**2, axis=1), 1e-300))
+def weights(residual: Array, counted: float | Array = 1.0) -> Array:
+    """One over the residual's RMS, per channel; `counted` samples count as one."""
+    return 1 / np.sqrt(np.maximum(counted * np.mean(residual**2, axis=1), 1e-300))
 
 
 def theta_slopes(
@@ -202,8 +202,8 @@ def fit(
     theta = np.asarray(theta, dtype=float)
     n = theta.size
     e = misfit.residual(theta, causes, observer=observer, n_train=n_train)
-    P = misfit.parameters.precision
-    f, damping = objective(e, theta, P, misfit.colour), 1e-3
+    P, counted = misfit.parameters.precision, misfit.counting_as_one(n_train)
+    f, damping = objective(e, theta, P, counted), 1e-3
     age = refresh if slopes is None else 1
     linear = _Linear(np.zeros((0, *e.shape)) if slopes is None else slopes)
     size = n + sum(cause.n for cause in causes)
@@ -216,7 +216,7 @@ def fit(
             linear, age = _Linear(theta_slopes(misfit, theta, causes, observer, e, n_train)), 0
         fresh = age == 0
         age += 1
-        w = weights(e, misfit.colour)
+        w = weights(e, counted)
         own = finite(cause_slopes(misfit, theta, causes, observer, e, n_train))
         information, g = linear.beside(own, e, w)
         H = information + prior
@@ -233,7 +233,7 @@ def fit(
                 d *= misfit.parameters.allowed(d[:n])
                 trial, trial_causes = theta + d[:n], moved_by(causes, d[n:])
                 trial_e = misfit.residual(trial, trial_causes, observer=observer, n_train=n_train)
-                trial_f = objective(trial_e, trial, P, misfit.colour)
+                trial_f = objective(trial_e, trial, P, counted)
                 if trial_f < f:
                     step = f - trial_f
                     break

@@ -68,12 +68,13 @@ class Glance:
                 cause_slopes(misfit, theta, present, observer, e, n_train),
             ]
         )
-        w = weights(e, misfit.colour)
+        counted = misfit.counting_as_one(n_train)
+        w = weights(e, counted)
         J = (slopes * w[:, None]).reshape(len(slopes), -1)
         information = J @ J.T
         information[: theta.size, : theta.size] += misfit.parameters.precision
         spread = np.asarray(np.linalg.pinv(information, rcond=1e-13, hermitian=True), dtype=np.float64)
-        base = objective(e, theta, misfit.parameters.precision, misfit.colour)
+        base = objective(e, theta, misfit.parameters.precision, counted)
         chance = Chance(e.shape, sum(misfit.n_train) * len(e))
         return cls(misfit, theta, present, observer, n_train, base, w, slopes, spread, chance)
 
@@ -125,6 +126,11 @@ class Glance:
         )
 
     @cached_property
+    def _counted(self) -> float | Array:
+        """Samples that count as one."""
+        return self.misfit.counting_as_one(self.n_train)
+
+    @cached_property
     def _weighted(self) -> Array:
         """Slopes over the variance of each channel, a row for each variable: what they have in common with a residual."""
         return np.asarray((self.slopes * self.weights[:, None] ** 2).reshape(len(self.slopes), -1))
@@ -136,7 +142,7 @@ class Glance:
         gradient[:n] += P @ self.theta
         d = -self.spread @ gradient
         left = r + np.tensordot(d, self.slopes, axes=1)
-        return left, self.theta + d[:n], objective(left, self.theta + d[:n], P, self.misfit.colour)
+        return left, self.theta + d[:n], objective(left, self.theta + d[:n], P, self._counted)
 
     def _own_slopes(self, h: Hypothesis, r: Array) -> tuple[Array, Array]:
         """Slopes of the residual by a hypothesis' own variables, the model's parameters following, and slopes of these."""
@@ -148,7 +154,7 @@ class Glance:
     def _stepped(self, started: _Start, own: Array, follow: Array) -> _Start:
         """A start after a Gauss-Newton step on its own variables; itself where none helps."""
         h, _, left, parameters, f, damping = started
-        P, v = self.misfit.parameters.precision, weights(left, self.misfit.colour)
+        P, v = self.misfit.parameters.precision, weights(left, self._counted)
         A = (own * v[:, None]).reshape(h.n, -1)
         # What a cause explains, the parameters need not: the prior is relieved.
         G = A @ A.T + follow @ P @ follow.T

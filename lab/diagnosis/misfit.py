@@ -79,6 +79,18 @@ class Misfit:
         """Whether samples of each record are missing."""
         return tuple(bool(np.any(np.isnan(y))) for _, y in self.records)
 
+    def counting_as_one(self, n_train: Sequence[int] | None = None) -> float | Array:
+        """Samples of a residual that count as one: `colour`, and for each output more where some are missing, (n_outputs,)."""
+        if not any(self._gaps):
+            return self.colour
+        known = [~np.isnan(y[:, :n]) for (_, y), n in zip(self.records, n_train or self.n_train, strict=True)]
+        every = np.concatenate(known, axis=1)
+        return np.asarray(self.colour * every.shape[1] / np.maximum(np.sum(every, axis=1), 1))
+
+    def made_whole(self, residual: Array) -> Array:
+        """A residual (n_outputs, n_total) with the power that it would have if no sample was missing."""
+        return np.asarray(residual * np.sqrt(np.reshape(self.counting_as_one() / self.colour, (-1, 1))))
+
     def plant(self, theta: Array, causes: Sequence[Hypothesis] = ()) -> Plant:
         """The plant at parameters `theta` with causes in it."""
         plant = self.twin.changed(*self.parameters.factors(theta))

@@ -174,7 +174,7 @@ def steadied(calibration: Calibration, candidates: list[Candidate], without: flo
         return candidates
     # It was led with few substeps and samples, and is held against a fit with as many as fits take.
     left = misfit.residual(guided.theta, guided.causes, observer=guided.observer)
-    if first.fit.objective <= objective(left, guided.theta, guided.precision, misfit.colour):
+    if first.fit.objective <= objective(left, guided.theta, guided.precision, misfit.counting_as_one()):
         return candidates
     theta, causes, share = guided.theta, guided.causes, calibration.share
     steps = np.geomspace(share / 10, NEGLIGIBLE, max(int(2 * np.log10(share / 10 / NEGLIGIBLE)), 0) + 1)

@@ -47,7 +47,7 @@ def moving(misfit: Misfit, fit: Fit) -> tuple[int, ...]:
     those at later instants, where nothing started (overdispersion as in quasi-likelihood, McCullagh and Nelder 1989, 4.5).
     """
     plant = misfit.plant(fit.theta)
-    w, first, found = weights(fit.residual, misfit.colour), 0, []
+    w, first, found = weights(fit.residual, misfit.counting_as_one()), 0, []
     for number, n in enumerate(misfit.n_train):
         e = fit.residual[:, first : first + n] * w[:, None]
         first += n

@@ -71,18 +71,29 @@ def patches(before: Whiteness, after: Whiteness) -> bool:
     )
 
 
-def whiteness(residual: Array, inputs: Array, signals: Array | None = None) -> Whiteness:
+def whiteness(
+    residual: Array, inputs: Array, signals: Array | None = None, *, missing: np.ndarray | None = None
+) -> Whiteness:
     """Test of a residual (n_outputs, n) against its own past, the inputs (n_inputs, n) and powers of the signals.
 
     Under white noise every correlation is Gaussian with variance 1 / n; the limit is that of the largest of all of them
     (Ljung 1999, System Identification, 16.6; Bonferroni). Signals (n_outputs, n) are the model's, in which noise has no part:
-    what is left of a clipped or bent one shows in its second and third power, once nothing is left for a straight line.
+    what is left of a clipped or bent one shows in its second and third power, once nothing is left for a straight line. Where
+    samples are `missing` (n_outputs, n), the residual is zero and fewer pairs tell of its past.
     """
     n = residual.shape[1]
-    e = _normalized(residual)
+    known = np.ones(residual.shape, dtype=bool) if missing is None else ~missing
+    if not np.all(known):
+        # So few samples tell nothing of what they have in common.
+        known = known & (np.sum(known, axis=1, keepdims=True) > LAGS * (2 + len(inputs)))
+    e = _normalized(residual, known)
+    # In standard deviations, (n_lags, n_outputs).
     own = np.stack(
-        [np.sum(e[:, k:] * e[:, : n - k], axis=1) for k in range(1, LAGS + 1)]
-    )  # (n_lags, n_outputs)
+        [
+            np.sum(e[:, k:] * e[:, : n - k], axis=1) * _scale(known[:, k:] & known[:, : n - k], known)
+            for k in range(1, LAGS + 1)
+        ]
+    )
     driven = inputs[np.std(inputs, axis=1) > 0] if inputs.size else np.zeros((0, n))
     u = _normalized(driven)
     cross = np.array([[e[:, k:] @ row[: n - k] for k in range(LAGS)] for row in u]).reshape(
@@ -97,13 +108,13 @@ def whiteness(residual: Array, inputs: Array, signals: Array | None = None) -> W
     tests = own.size + cross.size + bends.size
     limit = -float(scipy.special.ndtri(LEVEL / (2 * max(tests, 1))))
     k, i = np.unravel_index(np.argmax(np.abs(own)), own.shape)
-    shares = _predictable(e, u, curves)
+    shares = _predictable(e, u, curves, known)
     told = (
         float(np.max(shares)),
         float(-np.sum(np.log1p(-np.clip(shares, 0.0, 1 - 1e-12)))),
         float(np.sum(np.log(np.maximum(np.mean(residual**2, axis=1), 1e-300)))),
     )
-    best = Whiteness(float(np.sqrt(n) * np.abs(own[k, i])), limit, int(i), int(k) + 1, None, *told)
+    best = Whiteness(float(np.abs(own[k, i])), limit, int(i), int(k) + 1, None, *told)
     if cross.size:
         j, k, i = np.unravel_index(np.argmax(np.abs(cross)), cross.shape)
         size = float(np.sqrt(n) * np.abs(cross[j, k, i]))
@@ -127,7 +138,14 @@ def _curves(signal: Array) -> Array:
     return np.asarray(np.where(new, Q, 0.0)[:, 2:].T)
 
 
-def _predictable(e: Array, u: Array, curves: Array) -> Array:
+def _scale(pairs: np.ndarray, known: np.ndarray) -> Array:
+    """What makes standard deviations of sums over pairs of samples of rows of unit length, (n_outputs,)."""
+    if np.all(known):
+        return np.full(len(known), np.sqrt(known.shape[1]))
+    return np.asarray(np.sum(known, axis=1) / np.sqrt(np.maximum(np.sum(pairs, axis=1), 1)))
+
+
+def _predictable(e: Array, u: Array, curves: Array, known: np.ndarray) -> Array:
     """Share of each channel's power that a regression on past, inputs and its own curves explains, adjusted for its size."""
     n = e.shape[1] - LAGS
     driven = [row[LAGS - k : LAGS - k + n] for row in u for k in range(LAGS)]
@@ -139,11 +157,22 @@ def _predictable(e: Array, u: Array, curves: Array) -> Array:
         target = row[LAGS:]
         found = np.linalg.lstsq(regressors @ regressors.T, regressors @ target, rcond=1e-10)[0]
         left = target - found @ regressors
-        freedom = max(n - len(regressors), 1)
-        shares.append(1 - (left @ left / freedom) / max(target @ target / n, 1e-300))
+        samples = np.sum(known[i, LAGS:])
+        if not samples:
+            shares.append(0.0)
+            continue
+        freedom = max(samples - len(regressors), 1)
+        shares.append(1 - (left @ left / freedom) / max(target @ target / max(samples, 1), 1e-300))
     return np.array(shares)
 
 
-def _normalized(rows: Array) -> Array:
-    centred = rows - rows.mean(axis=1, keepdims=True)
+def _normalized(rows: Array, known: np.ndarray | None = None) -> Array:
+    """Rows without their mean and of unit length; zero where a sample is not known."""
+    if known is None or np.all(known):
+        centred = rows - rows.mean(axis=1, keepdims=True)
+    else:
+        mean = np.sum(rows, axis=1, keepdims=True, where=known) / np.maximum(
+            np.sum(known, axis=1, keepdims=True), 1
+        )
+        centred = np.where(known, rows - mean, 0.0)
     return np.asarray(centred / np.maximum(np.linalg.norm(centred, axis=1, keepdims=True), 1e-300))

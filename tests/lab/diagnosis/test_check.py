@@ -63,11 +63,48 @@ def test_nothing_that_changes_is_refused(rig):
     still = replace(good.records[0], outputs=np.zeros((2, N)))
     with pytest.raises(LabError, match="no output ever changes"):
         living(replace(good, records=(still,)))
+    # Fits see 1400 samples.
+    for side, signal in (("outputs", good.records[0].outputs), ("inputs", good.records[0].inputs)):
+        late = replace(good.records[0], **{side: np.where(np.arange(N) < 1400, 0.0, signal)})
+        with pytest.raises(LabError, match="changes in the first 70 % of any record"):
+            living(replace(good, records=(late,)))
     unmoved = replace(good.records[0], inputs=np.zeros((2, N)))
     with pytest.raises(LabError, match=r"input force0 and force1 never changes.*free_decay"):
         living(replace(good, records=(unmoved,)))
     decay = replace(unmoved, kind="free_decay")
     assert living(replace(good, records=(unmoved, decay)))[1] == ()
+
+
+def test_samples_that_cannot_be_used_are_refused(rig):
+    good = recorded(rig, white())
+    record = good.records[0]
+
+    def changed(**sides):
+        return replace(good, records=(replace(record, **sides),))
+
+    def broken(signal, where, value):
+        signal = np.array(signal)
+        signal[where] = value
+        return signal
+
+    for sides, message in (
+        (
+            {"inputs": broken(record.inputs, (1, 7), np.nan)},
+            r"input force1 is missing in sample 7 of record 0",
+        ),
+        ({"inputs": broken(record.inputs, (0, 9), np.inf)}, r"input force0 is infinite in sample 9"),
+        ({"outputs": broken(record.outputs, (1, 5), -np.inf)}, r"output pos1 is infinite in sample 5"),
+        (
+            {"outputs": broken(record.outputs, np.s_[:, 1400:], np.nan)},
+            "behind the first 70 % of each record is missing",
+        ),
+        (
+            {side: getattr(record, side)[:, :142] for side in ("inputs", "outputs")},
+            "99 samples; expected at least 100",
+        ),
+    ):
+        with pytest.raises(LabError, match=message):
+            living(changed(**sides))
 
 
 def test_modes_beyond_half_the_sample_rate(rig):

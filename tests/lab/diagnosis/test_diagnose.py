@@ -78,7 +78,7 @@ def test_a_change_that_may_not_be_named_is_not_calibrated_away(rig):
 
 
 def test_data_without_forces_are_refused(rig):
-    decay = simulate(rig, FreeDecay({"x1": 0.1}), sample_rate=5.0, duration=20.0)
+    decay = simulate(rig, FreeDecay({"x1": 0.1}), sample_rate=5.0, duration=40.0)
     pushed = replace(decay, records=(replace(decay.records[0], kind="random"),))
     with pytest.raises(LabError, match="no measured input"):
         diagnose(pushed, rig)
@@ -126,9 +126,27 @@ def test_a_record_that_does_not_begin_at_rest_is_noticed(rig):
     assert diagnosis.errors.calibrated == pytest.approx(NOISE / 100, rel=0.1)
 
 
-def test_missing_samples_are_left_out(rig):
+@pytest.mark.parametrize("share", [0.01, 0.9])
+def test_missing_samples_are_left_out(rig, share):
     recording = measured(rig)
     outputs = np.array(recording.records[0].outputs)
-    outputs[1, 300:310] = np.nan
+    n = int(0.7 * outputs.shape[1])
+    outputs[1, 20 : 20 + int(share * n)] = np.nan
     holed = replace(recording, records=(replace(recording.records[0], outputs=outputs),))
-    assert diagnose(holed, rig).verdict == CONSISTENT
+    diagnosis = diagnose(holed, rig)
+    assert (diagnosis.verdict, diagnosis.findings) == (CONSISTENT, ())
+    # A tenth of the samples tell a level to a tenth of it, or better.
+    whole = diagnose(recording, rig).noise
+    for name, level in diagnosis.noise.items():
+        assert level.value == pytest.approx(whole[name].value, rel=0.35)
+
+
+def test_an_output_that_never_changes_is_left_out(rig):
+    recording = measured(rig)
+    outputs = np.array(recording.records[0].outputs)
+    outputs[1] = 0.0
+    diagnosis = diagnose(replace(recording, records=(replace(recording.records[0], outputs=outputs),)), rig)
+    assert diagnosis.verdict == CONSISTENT
+    name = recording.outputs[1].name
+    assert diagnosis.unlearnable[0] == f"output {name} never changes: it was left out; check the channel"
+    assert name not in [channel.name for channel in diagnosis.nominal.outputs]

@@ -38,6 +38,22 @@ def test_what_an_input_explains_is_found():
     assert (found.channel, found.lag, found.with_input) == (2, 5, 1)
 
 
+def test_gaps_neither_hide_nor_make_what_is_left():
+    missing = np.zeros((3, N), dtype=bool)
+    missing[0, 300:3700] = missing[2, :3990] = True
+    missing[1] = np.arange(N) % 3 == 0
+    # One seed in a thousand would fail.
+    for seed in range(5):
+        gappy = np.where(missing, 0.0, noise(seed) + 0.3)
+        assert whiteness(gappy, noise(100 + seed, 2), missing=missing).white
+    e, a = noise(0), 0.6
+    e[0] = scipy.signal.lfilter([1], [1, -a], e[0])
+    found = whiteness(np.where(missing, 0.0, e), noise(1, 1), missing=missing)
+    assert (found.channel, found.lag, found.white) == (0, 1, False)
+    # As without gaps, of 600 samples.
+    assert found.share == pytest.approx(a**2, abs=4 * 0.04)
+
+
 def test_noise_beside_signals_passes():
     # One seed in a thousand would fail, whatever the signals.
     signals = np.array([np.sign(noise(7, 1)[0]), 1e-9 * noise(8, 1)[0], np.zeros(N)])
